@@ -1,0 +1,148 @@
+// The compiler's stages, in pipeline order, and what passes between them. This header is the architecture:
+//   plan -> import -> encode -> choose -> share -> write
+#ifndef BILLOW_COMPILER_STAGES_H
+#define BILLOW_COMPILER_STAGES_H
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "billow/format/brick.h"
+#include "billow/format/layout.h"
+
+namespace billow::compiler {
+
+// Exit codes of the command (design: 0 done, 5 our own fault).
+enum class Fault : int { commandLine = 1, file = 2, input = 3, gpu = 4, internal = 5 };
+
+// What stops a compile: one clear line that names file, frame, grid and voxel as far as they are known, what was
+// expected and what to do.
+class Error : public std::runtime_error {
+ public:
+  Error(Fault fault, const std::string& message) : std::runtime_error(message), fault_(fault) {}
+  Fault fault() const { return fault_; }
+
+ private:
+  Fault fault_;
+};
+
+// Called with one line each; may be called from any thread.
+using Warn = std::function<void(const std::string&)>;
+
+// ---- plan: which files, frames and grids there are. Reads names and metadata only.
+
+enum class MissingFrames { error, hold, blank };
+enum class NonFinite { error, zero };
+
+struct ImportOptions {
+  std::vector<std::string> grids;  // names to take; empty: all
+  std::optional<std::int32_t> firstFrame, lastFrame;
+  std::int32_t frameStep = 1;
+  MissingFrames missing = MissingFrames::error;
+  NonFinite nonFinite = NonFinite::error;
+  bool sdfToFog = false;
+  std::optional<double> framesPerSecond;  // default: the manifest's, else 24
+};
+
+struct PlannedGrid {
+  std::string name;  // "density", or "velocity.x" for a component of a vec3 grid
+  std::string source;  // the OpenVDB grid's unique name
+  std::uint32_t component = format::kNone;
+  format::Role role = format::Role::none;
+  format::SourceType sourceType = format::SourceType::float32;
+};
+
+struct PlannedFrame {
+  std::int32_t number = 0;
+  std::vector<std::string> files;  // empty: missing in the source; several: their grids are merged
+  std::uint32_t flags = 0;         // format::kFrameHeld, kFrameBlank
+};
+
+struct PlannedVolume {
+  std::string name;
+  std::vector<PlannedGrid> grids;  // the union over all frames, in order of name
+  std::vector<PlannedFrame> frames;  // ascending numbers
+  double framesPerSecond = 24;
+  format::LookRecord look{};
+};
+
+struct Plan {
+  std::vector<PlannedVolume> volumes;
+};
+
+// `inputs` as on the command line: files, directories, globs, name_####.vdb, name_%04d.vdb, or one *.json manifest.
+// Throws Error.
+Plan planInputs(const std::vector<std::string>& inputs, const ImportOptions& options, const Warn& warn);
+
+// ---- import: one frame's grids as leaves and tiles, all scalar floats.
+
+struct Leaf {
+  std::array<std::int32_t, 3> origin;  // source index space, multiples of 8
+  format::Mask3 active;
+  format::Values values;  // inactive ones hold the background
+};
+
+struct Tile {  // an active constant region; dim 8, 128 or 4096, origin a multiple of dim
+  std::array<std::int32_t, 3> origin;
+  std::uint32_t dim;
+  float value;
+};
+
+struct ImportedGrid {
+  bool present = false;
+  float background = 0;
+  // world = M * (source index, 1); 3x4 row-major.
+  std::array<double, 12> indexToWorld{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+  std::vector<Leaf> leaves;  // ascending (origin x, y, z); none without an active voxel
+  std::vector<Tile> tiles;   // ascending (origin x, y, z, dim)
+  std::uint64_t activeVoxels = 0;  // tiles included
+  float min = 0, max = 0;    // of active values and background
+  std::string file;          // for messages
+};
+
+struct ImportedFrame {
+  std::vector<ImportedGrid> grids;  // as PlannedVolume::grids; absent ones have present == false
+};
+
+// Reads one planned frame. Thread-safe. Throws Error.
+ImportedFrame importFrame(const PlannedVolume& volume, const PlannedFrame& frame, const ImportOptions& options,
+                          const Warn& warn);
+
+// ---- encode: one brick, one encoding.
+
+// The candidate's values are lo + scale * texel; squaredError and maxError are measured against the source over active
+// voxels, with the very arithmetic of format::decodeBrick.
+struct Candidate {
+  std::uint32_t encoding = format::kEncodingConstant;
+  bool texelMask = false;  // inactive voxels are texel 0 (R8, R16): no mask is stored
+  float lo = 0;
+  float scale = 0;
+  double squaredError = 0;
+  float maxError = 0;
+  std::array<std::byte, 1024> payload;  // format::brickBytes(encoding) of it are used
+};
+
+struct BrickSource {
+  const format::Values* values;
+  const format::Mask3* active;
+  std::uint32_t activeCount;
+  float tile;  // what inactive voxels must become
+};
+
+// Each fills `out` whole (payload only as far as it is used).
+// Deterministic, thread-safe, no allocation.
+void encodeConstant(const BrickSource& brick, Candidate& out);
+void encodeBc7(const BrickSource& brick, std::uint32_t encoding, int effort, Candidate& out);
+void encodeBc4(const BrickSource& brick, std::uint32_t encoding, Candidate& out);
+void encodeR8(const BrickSource& brick, Candidate& out);
+void encodeR16(const BrickSource& brick, Candidate& out);
+
+}  // namespace billow::compiler
+
+#endif  // BILLOW_COMPILER_STAGES_H

@@ -1,0 +1,37 @@
+// What a grid frame costs on the GPU: the one policy for the runtime's index and for every size that we quote.
+#ifndef BILLOW_FORMAT_GPU_SIZE_H
+#define BILLOW_FORMAT_GPU_SIZE_H
+
+#include <cstdint>
+
+#include "billow/format/layout.h"
+
+namespace billow::format {
+
+enum class GpuIndex : std::uint32_t {
+  flat = 0,  // u32 Node3 slot + 1 for each 8^3 cell of the active box
+  tree = 1,  // Node5 and Node4s with a rank per mask word, and child lists
+};
+
+struct GpuBytes {
+  GpuIndex index = GpuIndex::flat;
+  std::uint64_t indexBytes = 0;
+  std::uint64_t node3Bytes = 0;
+  std::uint64_t maskBytes = 0;
+  std::uint64_t brickBytes[kBrickClassCount] = {};
+  std::uint64_t total() const;
+};
+
+// Brick cells of the active box, per axis (0 where nothing is active).
+struct CellBox {
+  std::uint32_t min[3];  // in bricks, pack index space
+  std::uint32_t dim[3];
+  std::uint64_t count() const { return std::uint64_t{dim[0]} * dim[1] * dim[2]; }
+};
+CellBox cellBox(const GridFrame& gridFrame);
+
+GpuBytes gpuBytes(const GridFrame& gridFrame);
+
+}  // namespace billow::format
+
+#endif  // BILLOW_FORMAT_GPU_SIZE_H

@@ -1,0 +1,55 @@
+// Writing a pack: append items to the six global arrays in order, close with the tables. Deterministic.
+#ifndef BILLOW_FORMAT_WRITER_H
+#define BILLOW_FORMAT_WRITER_H
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "billow/format/layout.h"
+
+namespace billow::format {
+
+// Everything but the pages.
+struct PackTables {
+  std::vector<VolumeRecord> volumes;
+  std::vector<GridRecord> grids;
+  std::vector<FrameRecord> frames;
+  std::vector<GridFrame> gridFrames;
+  std::vector<std::uint32_t> pageLists;
+  std::string strings;
+  std::string infoJson;  // "" writes no INFO section
+
+  StringRef addString(const std::string& text);  // equal strings share
+};
+
+// Writes to a temporary name beside `path`, renamed by finish(); the destructor removes what is unfinished.
+// Throws std::system_error (with the path) when the file cannot be written.
+class PackWriter {
+ public:
+  struct Options {
+    std::uint32_t pageBytes = 128u << 10;  // raw bytes at which a page is closed
+    int zstdLevel = 3;
+  };
+  PackWriter(std::string path, Options options);
+  PackWriter(const PackWriter&) = delete;
+  PackWriter& operator=(const PackWriter&) = delete;
+  ~PackWriter();
+
+  // Appends `count` items and returns the global index of the first. All of one call lies in one page.
+  std::uint32_t append(Stream stream, const void* items, std::uint32_t count);
+  // The page in which the stream's item lies (or will lie, while its page is open).
+  std::uint32_t pageOf(Stream stream, std::uint32_t index) const;
+
+  void finish(const PackTables& tables);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace billow::format
+
+#endif  // BILLOW_FORMAT_WRITER_H
