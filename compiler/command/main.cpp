@@ -1,0 +1,75 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+#include <new>
+#include <string>
+#include <system_error>
+
+#include "command.h"
+#ifdef BILLOW_WITH_COMPILER
+#include "stages.h"
+#endif
+
+namespace billow::command {
+namespace {
+
+int complain(const std::string& what, int code) {
+  fmt::print(stderr, "billow: error: {}\n", what);
+  return code;
+}
+
+int runGuarded(const Run& run) {
+  try {
+    return run();
+#ifdef BILLOW_WITH_COMPILER
+  } catch (const compiler::Error& error) {
+    return complain(error.what(), static_cast<int>(error.fault()));
+#endif
+  } catch (const std::system_error& error) {
+    return complain(error.what(), kFile);
+  } catch (const std::bad_alloc&) {
+    return complain("out of memory", kInternal);
+  } catch (const std::exception& error) {
+    return complain(fmt::format("{} (this is a fault of billow's own; please report it)", error.what()), kInternal);
+  }
+}
+
+}  // namespace
+
+int reportIssue(const std::string& path, const format::Issue& issue) {
+  // Ids below 100 are about getting at the bytes, not about what they say.
+  const bool unreadable = issue.kind != nullptr && issue.kind->id < 100;
+  return complain(fmt::format("{}: {}", path, format::toString(issue)), unreadable ? kFile : kInvalid);
+}
+
+}  // namespace billow::command
+
+int main(int argc, char** argv) {
+  using namespace billow::command;
+  CLI::App app{"billow turns OpenVDB sequences into packs that games play.\n"
+               "Exit codes: 0 done, 1 command line, 2 a file cannot be read or written, 3 invalid input or pack,\n"
+               "4 no usable GPU or GPU failure, 5 billow's own fault."};
+  app.name("billow");
+  app.set_version_flag("--version", "billow " BILLOW_VERSION);
+  app.require_subcommand(1);
+  Run run;
+#ifdef BILLOW_WITH_COMPILER
+  addCompile(app, run);
+#endif
+  addInfo(app, run);
+  addValidate(app, run);
+#ifdef BILLOW_WITH_COMPILER
+  addExtract(app, run);
+  addCompare(app, run);
+#endif
+#ifdef BILLOW_WITH_RUNTIME
+  addRender(app, run);
+#endif
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kCommandLine;
+  }
+  return runGuarded(run);
+}
