@@ -258,7 +258,7 @@ struct GridFrame {
   std::uint32_t node4Count;      // distinct, reachable from node5
   std::uint32_t node3Count;
   std::uint32_t maskCount;
-  std::uint32_t childCount;             // child list entries, of Node5 and Node4s
+  std::uint32_t childCount;                    // children of the Node5 and of each distinct Node4, summed
   std::uint32_t brickCount[kBrickClassCount];  // distinct bricks by class
 };
 BILLOW_ASSERT_SIZE(GridFrame, 224);

@@ -1,0 +1,153 @@
+#include "compile.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+
+#include "command.h"
+#include "import_options.h"
+
+namespace billow::command {
+namespace {
+
+std::atomic<bool> interrupted{false};
+
+extern "C" void onInterrupt(int signal) {
+  // A second signal ends the process at once; the unfinished file has a temporary name.
+  if (interrupted.exchange(true)) std::_Exit(128 + signal);
+}
+
+struct Arguments {
+  std::vector<std::string> inputs;
+  std::string output;
+  ImportArguments import;
+  std::optional<double> psnr;
+  std::optional<float> maxError;
+  std::optional<std::uint64_t> gpuBudget;
+  std::optional<double> framesPerSecond;
+  int effort = 1;
+  unsigned threads = 0;
+  bool json = false;
+};
+
+void drawProgress(std::size_t done, std::size_t total) {
+  constexpr std::size_t kWidth = 32;
+  const std::size_t filled = done * kWidth / total;
+  fmt::print(stderr, "\r[{:#<{}}{:.<{}}] {}/{} frames{}", "", filled, "", kWidth - filled, done, total,
+             done == total ? "\n" : "");
+  std::fflush(stderr);
+}
+
+std::string psnrText(double psnr) { return std::isfinite(psnr) ? fmt::format("{:.2f} dB", psnr) : "exact"; }
+
+const char* const kEncodingNames[format::kEncodingCount] = {"constant", "bc7z", "bc7y", "bc7x", "bc4z",
+                                                            "bc4y",     "bc4x", "r8",   "r16"};
+
+std::string bricksText(const compiler::GridReport& grid) {
+  const auto& b = grid.bricks;
+  return fmt::format("{} / {} / {} / {} / {}", b[0], b[1] + b[2] + b[3], b[4] + b[5] + b[6], b[7], b[8]);
+}
+
+void printReport(const compiler::CompileReport& report, const std::string& output) {
+  fmt::print("{}: {} frame{}, {:.2f} MB\n", output, report.frames, report.frames == 1 ? "" : "s",
+             static_cast<double>(report.fileBytes) * 1e-6);
+  fmt::print("{:<24} {:>6} {:>13} {:>10} {:>12} {:>12}   {}\n", "grid", "frames", "active voxels", "worst PSNR",
+             "max error", "GPU/frame", "bricks: constant / BC7 / BC4 / R8 / R16");
+  for (const compiler::GridReport& grid : report.grids) {
+    const std::string name = grid.volume.empty() ? grid.grid : grid.volume + "/" + grid.grid;
+    fmt::print("{:<24} {:>6} {:>13} {:>10} {:>12.4g} {:>9.1f} KB   {}\n", name, grid.frames, grid.activeVoxels,
+               psnrText(grid.worstPsnr), grid.maxError, static_cast<double>(grid.largestFrameGpuBytes) * 1e-3,
+               bricksText(grid));
+  }
+}
+
+nlohmann::ordered_json reportJson(const compiler::CompileReport& report, const std::string& output) {
+  nlohmann::ordered_json json;
+  json["output"] = output;
+  json["frames"] = report.frames;
+  json["fileBytes"] = report.fileBytes;
+  json["grids"] = nlohmann::ordered_json::array();
+  for (const compiler::GridReport& grid : report.grids) {
+    nlohmann::ordered_json row;
+    row["volume"] = grid.volume;
+    row["grid"] = grid.grid;
+    row["frames"] = grid.frames;
+    row["activeVoxels"] = grid.activeVoxels;
+    row["worstPsnr"] = std::isfinite(grid.worstPsnr) ? nlohmann::ordered_json(grid.worstPsnr) : nullptr;
+    row["maxError"] = grid.maxError;
+    row["largestFrameGpuBytes"] = grid.largestFrameGpuBytes;
+    for (std::size_t e = 0; e < grid.bricks.size(); ++e) row["bricks"][kEncodingNames[e]] = grid.bricks[e];
+    json["grids"].push_back(row);
+  }
+  return json;
+}
+
+int runCompile(const Arguments& arguments) {
+  compiler::CompileOptions options;
+  options.import = importOptions(arguments.import);
+  options.import.framesPerSecond = arguments.framesPerSecond;
+  if (arguments.psnr) options.quality.psnr = arguments.psnr;
+  // An error bound or a budget alone replaces the default PSNR.
+  if ((arguments.maxError || arguments.gpuBudget) && !arguments.psnr) options.quality.psnr.reset();
+  options.quality.maxError = arguments.maxError;
+  options.quality.gpuBudget = arguments.gpuBudget;
+  options.quality.effort = arguments.effort;
+  options.threads = arguments.threads;
+  options.interrupted = &interrupted;
+  if (isatty(STDERR_FILENO) != 0) options.progress = drawProgress;
+  std::signal(SIGINT, onInterrupt);
+  std::signal(SIGTERM, onInterrupt);
+  const compiler::CompileReport report = compiler::compile(arguments.inputs, arguments.output, options, printWarning);
+  if (arguments.json) {
+    fmt::print("{}\n", reportJson(report, arguments.output).dump(2));
+  } else {
+    printReport(report, arguments.output);
+  }
+  return kDone;
+}
+
+}  // namespace
+
+void addCompile(CLI::App& app, Run& run) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("compile", "Turn OpenVDB sequences into one pack");
+  command->add_option("INPUT", arguments->inputs,
+                      "Files, a folder, a quoted glob, name_####.vdb, name_%04d.vdb, or a *.json manifest")
+      ->required();
+  command->add_option("-o,--output", arguments->output, "The pack to write")->required()->type_name("OUT.blw");
+  CLI::Option* psnr = command->add_option("--psnr", arguments->psnr,
+                      "Least PSNR of every grid in every frame, over active voxels [45 unless --max-error or "
+                      "--gpu-budget is given]")
+      ->check(CLI::Range(1.0, 200.0))
+      ->type_name("DB");
+  command->add_option("--max-error", arguments->maxError, "Largest error of any active voxel, in the grid's own unit")
+      ->check(CLI::PositiveNumber)
+      ->type_name("E");
+  command->add_option("--gpu-budget", arguments->gpuBudget,
+                      "Largest GPU size of any frame, all grids together; the error is the least that fits")
+      ->transform(CLI::AsSizeValue(false))
+      ->excludes(psnr)
+      ->type_name("BYTES");
+  command->add_option("--fps", arguments->framesPerSecond, "Frames per second of the sequence [24, or the manifest's]")
+      ->check(CLI::PositiveNumber)
+      ->type_name("N");
+  addImportOptions(*command, arguments->import);
+  command->add_option("--effort", arguments->effort, "0 fastest to 9 smallest")
+      ->check(CLI::Range(0, 9))
+      ->capture_default_str();
+  command->add_option("--threads", arguments->threads, "Threads to use [all cores]; the pack does not depend on it")
+      ->check(CLI::Range(1u, 1024u))
+      ->type_name("N");
+  command->add_flag("--json", arguments->json, "Print the report as one JSON object");
+  command->footer("Example: billow compile 'fire_####.vdb' -o fire.blw");
+  command->callback([arguments, &run] { run = [arguments] { return runCompile(*arguments); }; });
+}
+
+}  // namespace billow::command

@@ -1,0 +1,76 @@
+#include <algorithm>
+#include <numeric>
+
+#include "choose/choose.h"
+
+namespace billow::compiler {
+namespace {
+
+// One step of a brick from a hull point to the next dearer one.
+struct Step {
+  double gain;  // squared error saved a byte
+  std::uint32_t brick;
+  std::uint32_t to;  // index into the brick's choices
+};
+
+// Indices of the choices on the lower convex hull, by ascending bytes.
+std::vector<std::uint32_t> hullOf(const std::vector<Choice>& choices, std::optional<float> maxError) {
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t i = 0; i < choices.size(); ++i) {
+    if (!maxError || choices[i].maxError <= *maxError) order.push_back(i);
+  }
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    if (choices[a].bytes != choices[b].bytes) return choices[a].bytes < choices[b].bytes;
+    return choices[a].squaredError < choices[b].squaredError;
+  });
+  const auto slope = [&](std::uint32_t a, std::uint32_t b) {
+    return (choices[a].squaredError - choices[b].squaredError) / double(choices[b].bytes - choices[a].bytes);
+  };
+  std::vector<std::uint32_t> hull;
+  for (const std::uint32_t next : order) {
+    if (!hull.empty() && choices[next].squaredError >= choices[hull.back()].squaredError) continue;
+    if (!hull.empty() && choices[next].bytes == choices[hull.back()].bytes) continue;
+    while (hull.size() >= 2 && slope(hull[hull.size() - 2], hull.back()) <= slope(hull.back(), next)) hull.pop_back();
+    hull.push_back(next);
+  }
+  return hull;
+}
+
+}  // namespace
+
+std::optional<std::vector<std::uint32_t>> allocate(std::span<const std::vector<Choice>> bricks, double budget,
+                                                   std::optional<float> maxError) {
+  std::vector<std::uint32_t> chosen(bricks.size());
+  std::vector<Step> steps;
+  for (std::uint32_t b = 0; b < bricks.size(); ++b) {
+    const std::vector<std::uint32_t> hull = hullOf(bricks[b], maxError);
+    if (hull.empty()) return std::nullopt;
+    chosen[b] = hull.front();
+    for (std::size_t h = 1; h < hull.size(); ++h) {
+      const Choice& from = bricks[b][hull[h - 1]];
+      const Choice& to = bricks[b][hull[h]];
+      steps.push_back({(from.squaredError - to.squaredError) / double(to.bytes - from.bytes), b, hull[h]});
+    }
+  }
+  // A brick's steps lose gain along its hull, so the sorted order keeps them in sequence.
+  std::stable_sort(steps.begin(), steps.end(), [](const Step& a, const Step& b) { return a.gain > b.gain; });
+  const auto total = [&] {
+    double sum = 0;
+    for (std::size_t b = 0; b < bricks.size(); ++b) sum += bricks[b][chosen[b]].squaredError;
+    return sum;
+  };
+  double error = total();
+  std::size_t next = 0;
+  // The running sum drifts by rounding, so it is taken afresh before the answer is believed.
+  for (;; error = total()) {
+    for (; error > budget && next < steps.size(); ++next) {
+      const Step& step = steps[next];
+      error -= bricks[step.brick][chosen[step.brick]].squaredError - bricks[step.brick][step.to].squaredError;
+      chosen[step.brick] = step.to;
+    }
+    if (total() <= budget) return chosen;
+    if (next == steps.size()) return std::nullopt;
+  }
+}
+
+}  // namespace billow::compiler

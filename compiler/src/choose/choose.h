@@ -1,0 +1,62 @@
+// The choose stage: every brick of one grid in one frame gets the cheapest encoding with which the grid keeps the error
+// that was asked for.
+#ifndef BILLOW_COMPILER_CHOOSE_H
+#define BILLOW_COMPILER_CHOOSE_H
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "stages.h"
+
+namespace billow::compiler {
+
+// What the user asks of every grid in every frame. All that are given hold.
+struct Quality {
+  std::optional<double> psnr = 45.0;  // dB; 20 log10((max - min) / rmse) over active voxels
+  std::optional<float> maxError;      // largest |reconstructed - source|, in the grid's own unit
+  std::optional<std::uint64_t> gpuBudget;  // bytes of a frame's grids together; then the PSNR is the best that fits
+  int effort = 1;                     // of the BC7 encoder, 0 to 9
+};
+
+struct ChosenBrick {
+  std::uint32_t encoding = format::kEncodingConstant;
+  bool texelMask = false;
+  float lo = 0;
+  float scale = 0;
+  std::vector<std::byte> payload;
+};
+
+struct ChosenGrid {
+  std::vector<ChosenBrick> bricks;  // one for each leaf of the imported grid, in its order
+  double squaredError = 0;          // over all active voxels (tiles are exact)
+  float maxError = 0;
+};
+
+// One result for each grid of a frame (empty for those not present). `where(grid)` names file, frame and grid in
+// messages. Uses all of TBB's threads; the result does not depend on their number.
+// Throws Error(input) when the quality cannot be had, saying what can.
+std::vector<ChosenGrid> chooseEncodings(std::span<const ImportedGrid> grids, const Quality& quality,
+                                        const std::function<std::string(std::size_t)>& where);
+
+// ---- The decision alone, for tests: one point a brick and encoding.
+
+struct Choice {
+  std::uint32_t bytes = 0;
+  double squaredError = 0;
+  float maxError = 0;
+};
+
+// Picks one choice a brick so that the sum of squared errors is at most `budget` at (nearly) the fewest bytes: greedy
+// along each brick's lower convex hull, steepest step first, ties by brick number. Choices with maxError above
+// `maxError` are not taken. nullopt: not reachable. The result holds an index into each brick's choices.
+std::optional<std::vector<std::uint32_t>> allocate(std::span<const std::vector<Choice>> bricks, double budget,
+                                                   std::optional<float> maxError);
+
+}  // namespace billow::compiler
+
+#endif  // BILLOW_COMPILER_CHOOSE_H

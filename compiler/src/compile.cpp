@@ -1,0 +1,217 @@
+#include "compile.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+#include <tbb/info.h>
+#include <tbb/parallel_pipeline.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "billow/format/gpu_size.h"
+#include "share/share.h"
+
+namespace billow::compiler {
+namespace {
+
+// Frames that are imported and encoded while others are written: one on its way in, one being encoded.
+constexpr std::size_t kFramesInFlight = 2;
+
+struct Job {
+  std::size_t volume = 0;
+  std::size_t frame = 0;
+};
+
+// A frame between the parallel and the serial stage.
+struct EncodedFrame {
+  Job job;
+  ImportedFrame imported;
+  std::vector<ChosenGrid> chosen;
+};
+
+double psnrOf(const format::GridFrame& frame) {
+  if (!(frame.squaredError > 0)) return std::numeric_limits<double>::infinity();
+  const double range = static_cast<double>(frame.sourceMax) - static_cast<double>(frame.sourceMin);
+  return 20 * std::log10(range / std::sqrt(frame.squaredError / static_cast<double>(frame.activeVoxels)));
+}
+
+std::string settingsJson(const CompileOptions& options) {
+  nlohmann::ordered_json info;
+  info["generator"] = "billow " BILLOW_VERSION;
+  info["quality"]["effort"] = options.quality.effort;
+  if (options.quality.psnr) info["quality"]["psnr"] = *options.quality.psnr;
+  if (options.quality.maxError) info["quality"]["maxError"] = static_cast<double>(*options.quality.maxError);
+  return info.dump(2) + "\n";
+}
+
+class Compiler {
+ public:
+  Compiler(const std::string& output, const CompileOptions& options, const Warn& warn, Plan plan)
+      : options_(options), warn_(warn), plan_(std::move(plan)), writer_(output, writerOptions(options)),
+        sharer_(writer_) {
+    for (std::size_t v = 0; v < plan_.volumes.size(); ++v) {
+      addVolume(plan_.volumes[v]);
+      for (std::size_t f = 0; f < plan_.volumes[v].frames.size(); ++f) jobs_.push_back({v, f});
+    }
+  }
+
+  CompileReport run() {
+    std::size_t next = 0;
+    tbb::parallel_pipeline(
+        kFramesInFlight,
+        tbb::make_filter<void, Job>(tbb::filter_mode::serial_in_order,
+                                    [&](tbb::flow_control& control) {
+                                      if (next == jobs_.size()) control.stop();
+                                      return next == jobs_.size() ? Job{} : jobs_[next++];
+                                    }) &
+            tbb::make_filter<Job, std::shared_ptr<EncodedFrame>>(tbb::filter_mode::parallel,
+                                                                 [this](Job job) { return encode(job); }) &
+            tbb::make_filter<std::shared_ptr<EncodedFrame>, void>(
+                tbb::filter_mode::serial_in_order,
+                [this](const std::shared_ptr<EncodedFrame>& frame) { write(*frame); }));
+    tables_.infoJson = settingsJson(options_);
+    writer_.finish(tables_);
+    report_.frames = jobs_.size();
+    return std::move(report_);
+  }
+
+ private:
+  static format::PackWriter::Options writerOptions(const CompileOptions& options) {
+    format::PackWriter::Options result;
+    result.zstdLevel = options.zstdLevel;
+    return result;
+  }
+
+  void addVolume(const PlannedVolume& volume) {
+    format::VolumeRecord record{};
+    record.name = tables_.addString(volume.name);
+    record.firstGrid = static_cast<std::uint32_t>(tables_.grids.size());
+    record.gridCount = static_cast<std::uint32_t>(volume.grids.size());
+    record.firstFrame = static_cast<std::uint32_t>(tables_.frames.size());
+    record.frameCount = static_cast<std::uint32_t>(volume.frames.size());
+    record.firstGridFrame = gridFrames_;
+    record.framesPerSecond = static_cast<float>(volume.framesPerSecond);
+    record.look = volume.look;
+    gridFrames_ += record.gridCount * record.frameCount;
+    for (const PlannedGrid& grid : volume.grids) {
+      format::GridRecord gridRecord{};
+      gridRecord.name = tables_.addString(grid.name);
+      gridRecord.role = static_cast<std::uint32_t>(grid.role);
+      gridRecord.sourceType = static_cast<std::uint32_t>(grid.sourceType);
+      gridRecord.component = grid.component;
+      gridRecord.volume = static_cast<std::uint32_t>(tables_.volumes.size());
+      tables_.grids.push_back(gridRecord);
+      GridReport gridReport;
+      gridReport.volume = volume.name;
+      gridReport.grid = grid.name;
+      gridReport.worstPsnr = std::numeric_limits<double>::infinity();
+      report_.grids.push_back(gridReport);
+    }
+    for (const PlannedFrame& frame : volume.frames) {
+      const double time = (frame.number - volume.frames.front().number) / volume.framesPerSecond;
+      tables_.frames.push_back({frame.number, frame.flags, time});
+    }
+    tables_.volumes.push_back(record);
+  }
+
+  void stopIfInterrupted() const {
+    if (options_.interrupted != nullptr && *options_.interrupted) throw Error(Fault::file, "interrupted; nothing was written");
+  }
+
+  std::string where(const Job& job, std::size_t grid) const {
+    const PlannedVolume& volume = plan_.volumes[job.volume];
+    const PlannedFrame& frame = volume.frames[job.frame];
+    return fmt::format("{}: frame {}: grid '{}'", frame.files.empty() ? volume.name : frame.files.front(), frame.number,
+                       volume.grids[grid].name);
+  }
+
+  bool isHeld(const Job& job) const {
+    return (plan_.volumes[job.volume].frames[job.frame].flags & format::kFrameHeld) != 0;
+  }
+
+  std::shared_ptr<EncodedFrame> encode(const Job& job) {
+    stopIfInterrupted();
+    auto frame = std::make_shared<EncodedFrame>();
+    frame->job = job;
+    if (isHeld(job)) return frame;
+    const PlannedVolume& volume = plan_.volumes[job.volume];
+    frame->imported = importFrame(volume, volume.frames[job.frame], options_.import, warn_);
+    stopIfInterrupted();
+    frame->chosen = chooseEncodings(frame->imported.grids, options_.quality,
+                                    [&](std::size_t grid) { return where(job, grid); });
+    return frame;
+  }
+
+  void write(const EncodedFrame& frame) {
+    const std::size_t grids = plan_.volumes[frame.job.volume].grids.size();
+    const std::uint32_t firstReport = tables_.volumes[frame.job.volume].firstGrid;
+    for (std::size_t g = 0; g < grids; ++g) {
+      tables_.gridFrames.push_back(isHeld(frame.job) ? tables_.gridFrames[tables_.gridFrames.size() - grids]
+                                                     : addGridFrame(frame, g));
+      if (!isHeld(frame.job)) tally(tables_.gridFrames.back(), frame.chosen[g], report_.grids[firstReport + g]);
+    }
+    ++done_;
+    if (options_.progress) options_.progress(done_, jobs_.size());
+  }
+
+  format::GridFrame addGridFrame(const EncodedFrame& frame, std::size_t g) {
+    const ImportedGrid& imported = frame.imported.grids[g];
+    if (!imported.present) return absent();
+    std::vector<std::uint32_t> pages;
+    format::GridFrame record = sharer_.addGrid(imported, frame.chosen[g], where(frame.job, g), pages);
+    record.flags = format::kGridPresent;
+    record.pageListBegin = static_cast<std::uint32_t>(tables_.pageLists.size());
+    record.pageListCount = static_cast<std::uint32_t>(pages.size());
+    tables_.pageLists.insert(tables_.pageLists.end(), pages.begin(), pages.end());
+    return record;
+  }
+
+  static format::GridFrame absent() {
+    format::GridFrame record{};
+    record.node5 = format::kNone;
+    for (int a = 0; a < 3; ++a) {
+      record.activeMax[a] = -1;
+      record.indexToWorld[5 * a] = 1;
+    }
+    return record;
+  }
+
+  static void tally(const format::GridFrame& record, const ChosenGrid& chosen, GridReport& report) {
+    if ((record.flags & format::kGridPresent) == 0) return;
+    ++report.frames;
+    report.activeVoxels += record.activeVoxels;
+    for (const ChosenBrick& brick : chosen.bricks) ++report.bricks[brick.encoding];
+    report.worstPsnr = std::min(report.worstPsnr, psnrOf(record));
+    report.maxError = std::max(report.maxError, record.maxError);
+    report.largestFrameGpuBytes = std::max(report.largestFrameGpuBytes, format::gpuBytes(record).total());
+  }
+
+  const CompileOptions& options_;
+  const Warn& warn_;
+  Plan plan_;
+  format::PackWriter writer_;
+  Sharer sharer_;
+  format::PackTables tables_;
+  std::vector<Job> jobs_;
+  std::uint32_t gridFrames_ = 0;
+  std::size_t done_ = 0;
+  CompileReport report_;
+};
+
+}  // namespace
+
+CompileReport compile(const std::vector<std::string>& inputs, const std::string& output, const CompileOptions& options,
+                      const Warn& warn) {
+  std::optional<tbb::global_control> limit;
+  if (options.threads != 0) limit.emplace(tbb::global_control::max_allowed_parallelism, options.threads);
+  CompileReport report = Compiler(output, options, warn, planInputs(inputs, options.import, warn)).run();
+  report.fileBytes = std::filesystem::file_size(output);
+  return report;
+}
+
+}  // namespace billow::compiler

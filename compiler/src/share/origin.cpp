@@ -1,0 +1,59 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "share/share.h"
+
+namespace billow::compiler {
+namespace {
+
+std::int64_t floorTo(std::int64_t value, std::int64_t step) {
+  const std::int64_t down = value / step * step;
+  return down > value ? down - step : down;
+}
+
+}  // namespace
+
+void activeBox(const ImportedGrid& grid, std::array<std::int64_t, 3>& min, std::array<std::int64_t, 3>& max) {
+  min.fill(std::numeric_limits<std::int64_t>::max());
+  max.fill(std::numeric_limits<std::int64_t>::min());
+  const auto grow = [&](std::size_t axis, std::int64_t low, std::int64_t high) {
+    min[axis] = std::min(min[axis], low);
+    max[axis] = std::max(max[axis], high);
+  };
+  for (const Tile& tile : grid.tiles) {
+    for (std::size_t a = 0; a < 3; ++a) grow(a, tile.origin[a], std::int64_t{tile.origin[a]} + tile.dim - 1);
+  }
+  for (const Leaf& leaf : grid.leaves) {
+    for (std::uint32_t index = 0; index < format::kBrickVoxels; ++index) {
+      if (!format::maskBit(leaf.active, index)) continue;
+      const std::int64_t at[3] = {index >> 6, index >> 3 & 7, index & 7};
+      for (std::size_t a = 0; a < 3; ++a) grow(a, leaf.origin[a] + at[a], leaf.origin[a] + at[a]);
+    }
+  }
+}
+
+std::array<std::int32_t, 3> chooseOrigin(const std::array<std::int64_t, 3>& min, const std::array<std::int64_t, 3>& max,
+                                         const std::string& where) {
+  std::array<std::int32_t, 3> origin{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    bool fits = false;
+    for (const std::int64_t step : {4096, 128, 8}) {
+      const std::int64_t low = floorTo(min[a], step);
+      if (max[a] - low >= format::kIndexSpan) continue;
+      origin[a] = static_cast<std::int32_t>(low);
+      fits = true;
+      break;
+    }
+    if (!fits) {
+      throw Error(Fault::input,
+                  fmt::format("{}: active voxels reach from {} to {} along {}; a grid may span {} voxels a frame: crop "
+                              "it, or split it into several grids",
+                              where, min[a], max[a], "xyz"[a], format::kIndexSpan));
+    }
+  }
+  return origin;
+}
+
+}  // namespace billow::compiler

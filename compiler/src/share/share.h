@@ -1,0 +1,59 @@
+// The share stage: chosen bricks become masks, Node3s, Node4s and a Node5, each stored once in the whole pack.
+#ifndef BILLOW_COMPILER_SHARE_H
+#define BILLOW_COMPILER_SHARE_H
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "billow/format/writer.h"
+#include "choose/choose.h"
+#include "stages.h"
+
+namespace billow::compiler {
+
+// Where pack voxel (0, 0, 0) of a grid lies in source index space, so that all of [min, max] fits 4096^3. The coarsest
+// alignment that fits is taken (4096, 128, 8), so that a tree keeps its shape from frame to frame.
+// Throws Error(input) naming `where` and the extent when nothing fits.
+std::array<std::int32_t, 3> chooseOrigin(const std::array<std::int64_t, 3>& min, const std::array<std::int64_t, 3>& max,
+                                         const std::string& where);
+
+// Inclusive box of active voxels and tiles in source index space; min > max where nothing is active.
+void activeBox(const ImportedGrid& grid, std::array<std::int64_t, 3>& min, std::array<std::int64_t, 3>& max);
+
+// Appends what is new to the writer and remembers what was written by its content (XXH3-128). Not thread-safe:
+// called frame by frame in order, so the pack's bytes do not depend on timing.
+class Sharer {
+ public:
+  explicit Sharer(format::PackWriter& writer) : writer_(writer) {}
+
+  // Fills everything of the record but flags. `pages` gets the pages that the grid frame needs, ascending.
+  format::GridFrame addGrid(const ImportedGrid& grid, const ChosenGrid& chosen, const std::string& where,
+                            std::vector<std::uint32_t>& pages);
+
+ private:
+  struct Key {
+    std::uint64_t low, high;
+    bool operator==(const Key&) const = default;
+  };
+  struct KeyHash {
+    std::size_t operator()(const Key& key) const { return key.low; }
+  };
+  friend class TreeBuilder;
+
+  Key keyOf(format::Stream stream, const void* bytes, std::size_t size) const;
+  // Index of equal content that is there already, or of the appended items.
+  std::uint32_t intern(format::Stream stream, const void* items, std::uint32_t count);
+
+  format::PackWriter& writer_;
+  // Two generations: what has not been met again for a generation is forgotten (and would be stored anew), so that
+  // memory stays bounded however long the sequence is: about 60 bytes an entry.
+  static constexpr std::size_t kGeneration = 1u << 20;
+  std::unordered_map<Key, std::uint32_t, KeyHash> recent_, older_;
+};
+
+}  // namespace billow::compiler
+
+#endif  // BILLOW_COMPILER_SHARE_H
