@@ -1,0 +1,16 @@
+// The structural walk over one grid's tree in a .vdb file.
+#ifndef BILLOW_COMPILER_IMPORT_VDB_WALK_H
+#define BILLOW_COMPILER_IMPORT_VDB_WALK_H
+
+#include "import/byte_reader.h"
+#include "import/vdb_file.h"
+
+namespace billow::compiler {
+
+// Walks topology and buffers from the reader's position (the tree's first byte) to the byte after the tree. Nothing is
+// decompressed; memory is two bytes a leaf. Throws Error(Fault::input).
+void walkTree(ByteReader& reader, const VdbGrid& grid);
+
+}  // namespace billow::compiler
+
+#endif  // BILLOW_COMPILER_IMPORT_VDB_WALK_H
