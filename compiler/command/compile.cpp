@@ -45,7 +45,9 @@ void drawProgress(std::size_t done, std::size_t total) {
   std::fflush(stderr);
 }
 
-std::string psnrText(double psnr) { return std::isfinite(psnr) ? fmt::format("{:.2f} dB", psnr) : "exact"; }
+std::string psnrText(double psnr) {
+  return std::isfinite(psnr) ? fmt::format("{:.2f} dB", psnr) : "exact";
+}
 
 const char* const kEncodingNames[format::kEncodingCount] = {"constant", "bc7z", "bc7y", "bc7x", "bc4z",
                                                             "bc4y",     "bc4x", "r8",   "r16"};
@@ -118,20 +120,24 @@ int runCompile(const Arguments& arguments) {
 void addCompile(CLI::App& app, Run& run) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("compile", "Turn OpenVDB sequences into one pack");
-  command->add_option("INPUT", arguments->inputs,
-                      "Files, a folder, a quoted glob, name_####.vdb, name_%04d.vdb, or a *.json manifest")
+  command
+      ->add_option("INPUT", arguments->inputs,
+                   "Files, a folder, a quoted glob, name_####.vdb, name_%04d.vdb, or a *.json manifest")
       ->required();
   command->add_option("-o,--output", arguments->output, "The pack to write")->required()->type_name("OUT.blw");
-  CLI::Option* psnr = command->add_option("--psnr", arguments->psnr,
-                      "Least PSNR of every grid in every frame, over active voxels [45 unless --max-error or "
-                      "--gpu-budget is given]")
-      ->check(CLI::Range(1.0, 200.0))
-      ->type_name("DB");
+  CLI::Option* psnr =
+      command
+          ->add_option("--psnr", arguments->psnr,
+                       "Least PSNR of every grid in every frame, over active voxels [45 unless --max-error or "
+                       "--gpu-budget is given]")
+          ->check(CLI::Range(1.0, 200.0))
+          ->type_name("DB");
   command->add_option("--max-error", arguments->maxError, "Largest error of any active voxel, in the grid's own unit")
       ->check(CLI::PositiveNumber)
       ->type_name("E");
-  command->add_option("--gpu-budget", arguments->gpuBudget,
-                      "Largest GPU size of any frame, all grids together; the error is the least that fits")
+  command
+      ->add_option("--gpu-budget", arguments->gpuBudget,
+                   "Largest GPU size of any frame, all grids together; the error is the least that fits")
       ->transform(CLI::AsSizeValue(false))
       ->excludes(psnr)
       ->type_name("BYTES");

@@ -43,11 +43,13 @@ bool parseFrames(std::string_view text, compiler::ImportOptions& options) {
 void addImportOptions(CLI::App& command, ImportArguments& arguments) {
   command.add_option("--grid", arguments.options.grids, "Take only this grid; may be given several times")
       ->type_name("NAME");
-  command.add_option("--frames", arguments.frames, "Take only frames A to B, every STEPth; numbered as the source does")
+  command
+      .add_option("--frames", arguments.frames, "Take only frames A to B, every STEPth; numbered as the source does")
       ->type_name("A-B[:STEP]");
-  command.add_option("--missing", arguments.missing,
-                     "A frame missing from the sequence is an error, repeats the frame before (hold), or is empty "
-                     "(blank)")
+  command
+      .add_option("--missing", arguments.missing,
+                  "A frame missing from the sequence is an error, repeats the frame before (hold), or is empty "
+                  "(blank)")
       ->check(CLI::IsMember({"error", "hold", "blank"}))
       ->capture_default_str();
   command.add_option("--non-finite", arguments.nonFinite, "A NaN or infinite voxel is an error, or becomes zero")
@@ -59,9 +61,10 @@ void addImportOptions(CLI::App& command, ImportArguments& arguments) {
 compiler::ImportOptions importOptions(const ImportArguments& arguments) {
   compiler::ImportOptions options = arguments.options;
   if (!arguments.frames.empty() && !parseFrames(arguments.frames, options)) {
-    throw compiler::Error(compiler::Fault::commandLine,
-                          fmt::format("--frames {}: expected A-B or A-B:STEP with A <= B and STEP >= 1, such as 10-50:2",
-                                      arguments.frames));
+    throw compiler::Error(
+        compiler::Fault::commandLine,
+        fmt::format("--frames {}: expected A-B or A-B:STEP with A <= B and STEP >= 1, such as 10-50:2",
+                    arguments.frames));
   }
   if (arguments.missing == "hold") options.missing = compiler::MissingFrames::hold;
   if (arguments.missing == "blank") options.missing = compiler::MissingFrames::blank;
@@ -69,6 +72,8 @@ compiler::ImportOptions importOptions(const ImportArguments& arguments) {
   return options;
 }
 
-void printWarning(const std::string& text) { fmt::print(stderr, "billow: warning: {}\n", text); }
+void printWarning(const std::string& text) {
+  fmt::print(stderr, "billow: warning: {}\n", text);
+}
 
 }  // namespace billow::command

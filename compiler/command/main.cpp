@@ -47,9 +47,10 @@ int reportIssue(const std::string& path, const format::Issue& issue) {
 
 int main(int argc, char** argv) {
   using namespace billow::command;
-  CLI::App app{"billow turns OpenVDB sequences into packs that games play.\n"
-               "Exit codes: 0 done, 1 command line, 2 a file cannot be read or written, 3 invalid input or pack,\n"
-               "4 no usable GPU or GPU failure, 5 billow's own fault."};
+  CLI::App app{
+      "billow turns OpenVDB sequences into packs that games play.\n"
+      "Exit codes: 0 done, 1 command line, 2 a file cannot be read or written, 3 invalid input or pack,\n"
+      "4 no usable GPU or GPU failure, 5 billow's own fault."};
   app.name("billow");
   app.set_version_flag("--version", "billow " BILLOW_VERSION);
   app.require_subcommand(1);

@@ -52,7 +52,10 @@ std::string settingsJson(const CompileOptions& options) {
 class Compiler {
  public:
   Compiler(const std::string& output, const CompileOptions& options, const Warn& warn, Plan plan)
-      : options_(options), warn_(warn), plan_(std::move(plan)), writer_(output, writerOptions(options)),
+      : options_(options),
+        warn_(warn),
+        plan_(std::move(plan)),
+        writer_(output, writerOptions(options)),
         sharer_(writer_) {
     for (std::size_t v = 0; v < plan_.volumes.size(); ++v) {
       addVolume(plan_.volumes[v]);
@@ -62,18 +65,17 @@ class Compiler {
 
   CompileReport run() {
     std::size_t next = 0;
-    tbb::parallel_pipeline(
-        kFramesInFlight,
-        tbb::make_filter<void, Job>(tbb::filter_mode::serial_in_order,
-                                    [&](tbb::flow_control& control) {
-                                      if (next == jobs_.size()) control.stop();
-                                      return next == jobs_.size() ? Job{} : jobs_[next++];
-                                    }) &
-            tbb::make_filter<Job, std::shared_ptr<EncodedFrame>>(tbb::filter_mode::parallel,
-                                                                 [this](Job job) { return encode(job); }) &
-            tbb::make_filter<std::shared_ptr<EncodedFrame>, void>(
-                tbb::filter_mode::serial_in_order,
-                [this](const std::shared_ptr<EncodedFrame>& frame) { write(*frame); }));
+    tbb::parallel_pipeline(kFramesInFlight,
+                           tbb::make_filter<void, Job>(tbb::filter_mode::serial_in_order,
+                                                       [&](tbb::flow_control& control) {
+                                                         if (next == jobs_.size()) control.stop();
+                                                         return next == jobs_.size() ? Job{} : jobs_[next++];
+                                                       }) &
+                               tbb::make_filter<Job, std::shared_ptr<EncodedFrame>>(
+                                   tbb::filter_mode::parallel, [this](Job job) { return encode(job); }) &
+                               tbb::make_filter<std::shared_ptr<EncodedFrame>, void>(
+                                   tbb::filter_mode::serial_in_order,
+                                   [this](const std::shared_ptr<EncodedFrame>& frame) { write(*frame); }));
     tables_.infoJson = settingsJson(options_);
     writer_.finish(tables_);
     report_.frames = jobs_.size();
@@ -120,7 +122,8 @@ class Compiler {
   }
 
   void stopIfInterrupted() const {
-    if (options_.interrupted != nullptr && *options_.interrupted) throw Error(Fault::file, "interrupted; nothing was written");
+    if (options_.interrupted != nullptr && *options_.interrupted)
+      throw Error(Fault::file, "interrupted; nothing was written");
   }
 
   std::string where(const Job& job, std::size_t grid) const {
@@ -142,8 +145,8 @@ class Compiler {
     const PlannedVolume& volume = plan_.volumes[job.volume];
     frame->imported = importFrame(volume, volume.frames[job.frame], options_.import, warn_);
     stopIfInterrupted();
-    frame->chosen = chooseEncodings(frame->imported.grids, options_.quality,
-                                    [&](std::size_t grid) { return where(job, grid); });
+    frame->chosen =
+        chooseEncodings(frame->imported.grids, options_.quality, [&](std::size_t grid) { return where(job, grid); });
     return frame;
   }
 

@@ -30,7 +30,7 @@ struct GridReport {
   std::uint32_t frames = 0;  // in which the grid is present
   std::uint64_t activeVoxels = 0;
   std::array<std::uint64_t, format::kEncodingCount> bricks{};  // chosen, before sharing
-  double worstPsnr = 0;  // dB, over frames; infinite where exact
+  double worstPsnr = 0;                                        // dB, over frames; infinite where exact
   float maxError = 0;
   std::uint64_t largestFrameGpuBytes = 0;
 };

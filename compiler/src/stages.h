@@ -51,7 +51,7 @@ struct ImportOptions {
 };
 
 struct PlannedGrid {
-  std::string name;  // "density", or "velocity.x" for a component of a vec3 grid
+  std::string name;    // "density", or "velocity.x" for a component of a vec3 grid
   std::string source;  // the OpenVDB grid's unique name
   std::uint32_t component = format::kNone;
   format::Role role = format::Role::none;
@@ -66,7 +66,7 @@ struct PlannedFrame {
 
 struct PlannedVolume {
   std::string name;
-  std::vector<PlannedGrid> grids;  // the union over all frames, in order of name
+  std::vector<PlannedGrid> grids;    // the union over all frames, in order of name
   std::vector<PlannedFrame> frames;  // ascending numbers
   double framesPerSecond = 24;
   format::LookRecord look{};
@@ -99,11 +99,11 @@ struct ImportedGrid {
   float background = 0;
   // world = M * (source index, 1); 3x4 row-major.
   std::array<double, 12> indexToWorld{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-  std::vector<Leaf> leaves;  // ascending (origin x, y, z); none without an active voxel
-  std::vector<Tile> tiles;   // ascending (origin x, y, z, dim)
+  std::vector<Leaf> leaves;        // ascending (origin x, y, z); none without an active voxel
+  std::vector<Tile> tiles;         // ascending (origin x, y, z, dim)
   std::uint64_t activeVoxels = 0;  // tiles included
-  float min = 0, max = 0;    // of active values and background
-  std::string file;          // for messages
+  float min = 0, max = 0;          // of active values and background
+  std::string file;                // for messages
 };
 
 struct ImportedFrame {

@@ -61,8 +61,8 @@ class GridChooser {
     choices_.resize(grid.leaves.size());
   }
 
-  // Squared error that `psnr` dB allow. Tiles are exact and carry none, so it is spread over leaf voxels alone: a few noisy leaves
-  // beside a vast constant tile must not be let go on the tile's account.
+  // Squared error that `psnr` dB allow. Tiles are exact and carry none, so it is spread over leaf voxels alone: a few
+  // noisy leaves beside a vast constant tile must not be let go on the tile's account.
   double budget(std::optional<double> psnr) const {
     if (!psnr) return std::numeric_limits<double>::infinity();
     std::uint64_t voxels = 0;

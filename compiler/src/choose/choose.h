@@ -17,10 +17,10 @@ namespace billow::compiler {
 
 // What the user asks of every grid in every frame. All that are given hold.
 struct Quality {
-  std::optional<double> psnr = 45.0;  // dB; 20 log10((max - min) / rmse) over active voxels
-  std::optional<float> maxError;      // largest |reconstructed - source|, in the grid's own unit
+  std::optional<double> psnr = 45.0;       // dB; 20 log10((max - min) / rmse) over active voxels
+  std::optional<float> maxError;           // largest |reconstructed - source|, in the grid's own unit
   std::optional<std::uint64_t> gpuBudget;  // bytes of a frame's grids together; then the PSNR is the best that fits
-  int effort = 1;                     // of the BC7 encoder, 0 to 9
+  int effort = 1;                          // of the BC7 encoder, 0 to 9
 };
 
 struct ChosenBrick {

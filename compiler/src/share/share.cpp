@@ -191,8 +191,9 @@ class TreeBuilder {
     cutTiles_ += std::uint64_t{n} * n * n;
     if (cutTiles_ > kMaxCutTiles) {
       throw Error(Fault::input,
-                  where_ + ": spans nearly 4096 voxels with large constant tiles that cannot be aligned; move the grid "
-                           "by a multiple of 128 voxels, or crop it");
+                  where_ +
+                      ": spans nearly 4096 voxels with large constant tiles that cannot be aligned; move the grid "
+                      "by a multiple of 128 voxels, or crop it");
     }
     const Summary summary = addSmallTile(tile.value);
     for (std::uint32_t i = 0; i < n * n * n; ++i) {
