@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <new>
@@ -47,6 +48,8 @@ int reportIssue(const std::string& path, const format::Issue& issue) {
 
 int main(int argc, char** argv) {
   using namespace billow::command;
+  // A file that grows past a limit is then a failed write with a message, as on a full disk, not a silent death.
+  std::signal(SIGXFSZ, SIG_IGN);
   CLI::App app{
       "billow turns OpenVDB sequences into packs that games play.\n"
       "Exit codes: 0 done, 1 command line, 2 a file cannot be read or written, 3 invalid input or pack,\n"

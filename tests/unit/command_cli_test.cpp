@@ -1,0 +1,143 @@
+// The command line as users and build farms meet it: exit codes, outputs whole or not at all, JSON that is only JSON.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "run_command.h"
+
+namespace billow::tests {
+namespace {
+
+std::string quoted(const std::string& text) {
+  return "'" + text + "'";
+}
+
+TEST(Cli, HelpNamesEveryCommandAndItsExitCodes) {
+  const CommandResult result = billow("--help");
+  EXPECT_EQ(result.code, 0);
+  for (const char* word : {"compile", "info", "validate", "extract", "compare", "render", "Exit codes"}) {
+    EXPECT_NE(result.out.find(word), std::string::npos) << word;
+  }
+  for (const char* command : {"compile", "info", "validate", "extract", "compare", "render"}) {
+    EXPECT_EQ(billow(std::string(command) + " --help").code, 0) << command;
+  }
+}
+
+TEST(Cli, WrongCommandLinesExitWithOne) {
+  for (const char* line : {"", "frobnicate", "compile", "compile x.vdb", "compile x.vdb -o y.blw --psnr forty",
+                           "compile x.vdb -o y.blw --frames 9-1", "compile x.vdb -o y.blw --psnr 45 --gpu-budget 1MB",
+                           "compile x.vdb -o y.blw --missing maybe", "validate", "validate a.blw --format yaml"}) {
+    const CommandResult result = billow(line);
+    EXPECT_EQ(result.code, 1) << line << "\n" << result.err;
+    EXPECT_FALSE(result.err.empty()) << line;
+  }
+}
+
+TEST(Cli, MissingFilesExitWithTwoAndAreNamed) {
+  const TempFolder folder;
+  const std::string absent = folder / "absent.blw";
+  for (const std::string& line :
+       {"validate " + quoted(absent), "info " + quoted(absent), "compare " + quoted(absent) + " x.vdb",
+        "extract " + quoted(absent) + " --frame 1 -o " + quoted(folder / "o.vdb"),
+        "render " + quoted(absent) + " --frame 1 -o " + quoted(folder / "o.png")}) {
+    const CommandResult result = billow(line);
+    EXPECT_EQ(result.code, 2) << line << "\n" << result.err;
+    EXPECT_NE(result.err.find("absent.blw"), std::string::npos) << line;
+  }
+  const CommandResult result = billow("compile " + quoted(folder / "absent.vdb") + " -o " + quoted(folder / "o.blw"));
+  EXPECT_EQ(result.code, 2) << result.err;
+  EXPECT_NE(result.err.find("absent.vdb"), std::string::npos);
+  EXPECT_EQ(folder.fileCount(), 0u);
+}
+
+TEST(Cli, CompilesValidatesAndReports) {
+  const TempFolder folder;
+  const std::string pack = folder / "fire.blw";
+  const CommandResult compiled = billow("compile " + quoted(sampleFire()) + " --json -o " + quoted(pack));
+  ASSERT_EQ(compiled.code, 0) << compiled.err;
+  EXPECT_EQ(compiled.err, "");
+  const auto report = nlohmann::json::parse(compiled.out);
+  EXPECT_EQ(report["frames"], 6);
+  EXPECT_EQ(report["grids"].size(), 4u);
+  for (const auto& grid : report["grids"]) EXPECT_GE(grid["worstPsnr"].get<double>(), 45.0);
+
+  const CommandResult valid = billow("validate --warnings-as-errors " + quoted(pack));
+  EXPECT_EQ(valid.code, 0) << valid.err << valid.out;
+  EXPECT_EQ(valid.out + valid.err, "");
+  EXPECT_EQ(nlohmann::json::parse(billow("validate --format json " + quoted(pack)).out)["issues"].size(), 0u);
+  EXPECT_TRUE(nlohmann::json::parse(billow("info --json " + quoted(pack)).out).is_object());
+}
+
+TEST(Cli, ThreadCountDoesNotChangeTheBytes) {
+  const TempFolder folder;
+  for (const char* threads : {"1", "2", "8"}) {
+    ASSERT_EQ(billow("compile " + quoted(sampleFire()) + " --frames 7-9 --threads " + threads + " -o " +
+                     quoted(folder / threads))
+                  .code,
+              0);
+  }
+  EXPECT_EQ(readFile(folder / "1"), readFile(folder / "2"));
+  EXPECT_EQ(readFile(folder / "1"), readFile(folder / "8"));
+}
+
+TEST(Cli, UnwritableFoldersExitWithTwo) {
+  const TempFolder folder;
+  const std::string file = folder / "file";
+  std::ofstream(file) << "not a folder";
+  const CommandResult result = billow("compile " + quoted(sampleFire()) + " -o " + quoted(file + "/out.blw"));
+  EXPECT_EQ(result.code, 2) << result.err;
+  EXPECT_NE(result.err.find("out.blw"), std::string::npos) << result.err;
+}
+
+TEST(Cli, AFullDiskExitsWithTwoAndLeavesNothing) {
+  const TempFolder folder;
+  // A file-size limit fails a write as a full disk does.
+  const CommandResult result =
+      billow("compile " + quoted(sampleFire()) + " -o " + quoted(folder / "out.blw"), "ulimit -f 16; ");
+  EXPECT_EQ(result.code, 2) << result.err;
+  EXPECT_NE(result.err.find("out.blw"), std::string::npos) << result.err;
+  EXPECT_EQ(folder.fileCount(), 0u);
+}
+
+TEST(Cli, AnInterruptedRunLeavesNothing) {
+  const TempFolder folder;
+  const std::string pack = folder / "out.blw";
+  std::ofstream(pack) << "the pack from before";
+  const CommandResult result = billow("compile " + quoted(sampleFire()) + " --effort 9 -o " + quoted(pack),
+                                      "timeout --preserve-status -s INT 0.15 ");
+  EXPECT_EQ(result.code, 2) << result.err;
+  EXPECT_NE(result.err.find("interrupted"), std::string::npos) << result.err;
+  EXPECT_EQ(folder.fileCount(), 1u);
+  EXPECT_EQ(readFile(pack), "the pack from before");
+}
+
+TEST(Cli, TheErrorAskedForHolds) {
+  const TempFolder folder;
+  const std::string pack = folder / "out.blw";
+  ASSERT_EQ(billow("compile " + quoted(sampleFire()) + " --frames 12 --max-error 0.01 -o " + quoted(pack)).code, 0);
+  const auto compared =
+      nlohmann::json::parse(billow("compare " + quoted(pack) + " " + quoted(sampleFire()) + " --frames 12 --json").out);
+  int rows = 0;
+  for (const auto& row : compared["grids"]) {
+    EXPECT_LE(row["maxError"].get<double>(), 0.01);
+    ++rows;
+  }
+  EXPECT_EQ(rows, 4);
+}
+
+TEST(Cli, TheGpuBudgetHolds) {
+  const TempFolder folder;
+  const std::string pack = folder / "out.blw";
+  const CommandResult result =
+      billow("compile " + quoted(sampleFire()) + " --gpu-budget 100000 --json -o " + quoted(pack));
+  ASSERT_EQ(result.code, 0) << result.err;
+  const auto report = nlohmann::json::parse(result.out);
+  std::uint64_t total = 0;  // of each grid's largest frame: at least that of any frame
+  for (const auto& grid : report["grids"]) total += grid["largestFrameGpuBytes"].get<std::uint64_t>();
+  EXPECT_LE(total, 110000u);
+  EXPECT_GE(total, 60000u);
+  EXPECT_EQ(billow("compile " + quoted(sampleFire()) + " --gpu-budget 1000 -o " + quoted(pack)).code, 3);
+}
+
+}  // namespace
+}  // namespace billow::tests
