@@ -140,6 +140,9 @@ struct BrickSource {
 void encodeConstant(const BrickSource& brick, Candidate& out);
 void encodeBc7(const BrickSource& brick, std::uint32_t encoding, int effort, Candidate& out);
 void encodeBc4(const BrickSource& brick, std::uint32_t encoding, Candidate& out);
+// The packed axis that fits best is found by a cheap test, and only that one is encoded in full.
+void encodeBc7BestAxis(const BrickSource& brick, int effort, Candidate& out);
+void encodeBc4BestAxis(const BrickSource& brick, Candidate& out);
 void encodeR8(const BrickSource& brick, Candidate& out);
 void encodeR16(const BrickSource& brick, Candidate& out);
 

@@ -1,0 +1,63 @@
+// Bricks that store a texel a voxel as it is, and bricks that store none.
+#include "encode/texel_range.h"
+
+namespace billow::compiler {
+namespace {
+
+// Fills `out` for texels of 8 or 16 bits. Where voxels are inactive, texel 0 is theirs and active ones start at 1.
+void encodeTexels(const BrickSource& brick, std::uint32_t encoding, std::uint32_t last, Candidate& out) {
+  std::uint32_t first = brick.activeCount < format::kBrickVoxels ? 1 : 0;
+  const ValueRange values = activeRange(brick);
+  TexelRange range = coverRange(values, first, last);
+  if (!(range.lo >= std::numeric_limits<float>::lowest())) {
+    first = 0;
+    range = coverRange(values, first, last);
+  }
+  out.encoding = encoding;
+  out.texelMask = first != 0;
+  out.lo = range.lo;
+  out.scale = range.scale;
+  TexelTargets targets;
+  TexelWeights weights;
+  texelTargets(brick, range, first, last, targets);
+  texelWeights(brick, weights);
+  format::Texels texels;
+  for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) {
+    const float active = targets[i] + 0.5f;
+    texels[i] = static_cast<std::uint16_t>(static_cast<std::int32_t>(weights[i] != 0.0f ? active : 0.0f));
+  }
+  for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) {
+    const std::uint32_t texel = texels[format::voxelIndex(i & 7, i >> 3 & 7, i >> 6)];
+    out.payload[i] = static_cast<std::byte>(texel & 0xff);
+    if (encoding == format::kEncodingR16) out.payload[format::kBrickVoxels + i] = static_cast<std::byte>(texel >> 8);
+  }
+  measure(brick, texels, out);
+}
+
+}  // namespace
+
+void encodeConstant(const BrickSource& brick, Candidate& out) {
+  TexelWeights weights;
+  texelWeights(brick, weights);
+  double total = 0;
+  for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) {
+    total += weights[i] != 0.0f ? static_cast<double>((*brick.values)[i]) : 0.0;
+  }
+  out.encoding = format::kEncodingConstant;
+  out.texelMask = false;
+  out.lo = brick.activeCount == 0 ? 0.0f : static_cast<float>(total / brick.activeCount);
+  out.scale = 0;
+  format::Texels texels;
+  texels.fill(0);
+  measure(brick, texels, out);
+}
+
+void encodeR8(const BrickSource& brick, Candidate& out) {
+  encodeTexels(brick, format::kEncodingR8, 255, out);
+}
+
+void encodeR16(const BrickSource& brick, Candidate& out) {
+  encodeTexels(brick, format::kEncodingR16, 65535, out);
+}
+
+}  // namespace billow::compiler
