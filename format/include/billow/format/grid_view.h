@@ -3,18 +3,19 @@
 #define BILLOW_FORMAT_GRID_VIEW_H
 
 #include <cstdint>
-#include <functional>
 #include <span>
 #include <vector>
 
 #include "billow/format/brick.h"
+#include "billow/format/gpu_size.h"
 #include "billow/format/pack.h"
 
 namespace billow::format {
 
 class GridView {
  public:
-  // Loads the pages that `gridFrame` lists and checks every node and brick that is reachable.
+  // Loads the pages that `gridFrame` lists and checks every node and brick that is reachable. A frame whose shared
+  // nodes stand for more than 2^24 bricks is refused (too-many-bricks).
   static Result<GridView> load(const Pack& pack, const GridFrame& gridFrame);
 
   const GridFrame& frame() const { return frame_; }
@@ -23,8 +24,8 @@ class GridView {
     std::uint32_t origin[3];  // pack index space, multiples of 8
     std::uint32_t index;      // global Node3 index
     Node3 node;
-    const Mask3* mask;                  // null unless node.mask is an index
-    std::span<const std::byte> brick;   // empty for a constant
+    const Mask3* mask;                 // null unless node.mask is an index
+    std::span<const std::byte> brick;  // empty for a constant
   };
   struct Tile {  // an active region without bricks: a childless Node4 (128) or Node5 (4096)
     std::uint32_t origin[3];
@@ -38,7 +39,7 @@ class GridView {
   // What the GPU's nearest lookup returns at pack index (x, y, z); the background outside of [0, 4095]^3.
   float voxel(std::int64_t x, std::int64_t y, std::int64_t z) const;
 
-  // Node arrays as loaded (global index -> node); throws nothing, the index must be reachable.
+  // Null where the grid frame has no Node5.
   const Node5* root() const { return root_; }
 
  private:
@@ -48,7 +49,9 @@ class GridView {
   std::vector<Leaf> leaves_;
   std::vector<Tile> tiles_;
   const Node5* root_ = nullptr;
-  std::vector<std::uint32_t> leafTable_;  // leaf number + 1 per brick cell of the active box, or empty: binary search
+  CellBox cells_{};
+  // One entry per brick cell of the active box: 0, leaf number + 1, or a tile's; empty (binary search) for huge boxes.
+  std::vector<std::uint32_t> leafTable_;
 };
 
 }  // namespace billow::format

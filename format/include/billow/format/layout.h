@@ -51,7 +51,9 @@ BILLOW_CONST kMaskTexel = 0xfffffffeu;  // R8 and R16 only: a voxel is active ex
 BILLOW_CONST kMaskIndexLimit = 0x80000000u;
 
 // ---- Node4.flags and Node5.flags
-BILLOW_CONST kNodeTileActive = 1u;  // voxels under absent children are active and hold `tile`; else inactive
+// Only in a node without children: all of its voxels are active and hold `tile`. Else voxels under absent children are
+// inactive and `tile` is the background.
+BILLOW_CONST kNodeTileActive = 1u;
 
 BILLOW_CONST kNone = 0xffffffffu;
 

@@ -19,8 +19,9 @@ struct ValidateOptions {
   unsigned threads = 0;            // 0: as many as the machine has
 };
 
-// Checks every byte of the pack. Issues arrive sorted by place, the same for any thread count.
-// Bounded: memory is a few pages a thread, the tables, and one GridFrame's nodes.
+// Checks every byte of the pack. Issues arrive in the order of the checks (header, contents, tables, sections, pages by
+// number, grid frames by number), the same for any thread count. `sink` is called from this thread.
+// Bounded: memory is the tables and, for each thread, the pages of one grid frame.
 void validate(const ByteSource& source, const ValidateOptions& options, const std::function<void(const Issue&)>& sink);
 
 }  // namespace billow::format

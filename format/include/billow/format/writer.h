@@ -25,6 +25,10 @@ struct PackTables {
   StringRef addString(const std::string& text);  // equal strings share
 };
 
+// Removes the temporary files of all writers that have not finished. Async-signal-safe: a program that may be
+// interrupted calls it from its handler of SIGINT and SIGTERM, then ends.
+void removeUnfinishedFiles() noexcept;
+
 // Writes to a temporary name beside `path`, renamed by finish(); the destructor removes what is unfinished.
 // Throws std::system_error (with the path) when the file cannot be written.
 class PackWriter {
@@ -38,11 +42,13 @@ class PackWriter {
   PackWriter& operator=(const PackWriter&) = delete;
   ~PackWriter();
 
-  // Appends `count` items and returns the global index of the first. All of one call lies in one page.
+  // Appends `count` items and returns the global index of the first. All of one call lies in one page, so a call may
+  // bring at most kMaxPageBytes (else std::length_error). A brick's units and a node's child list are one call each.
   std::uint32_t append(Stream stream, const void* items, std::uint32_t count);
   // The page in which the stream's item lies (or will lie, while its page is open).
   std::uint32_t pageOf(Stream stream, std::uint32_t index) const;
 
+  // Writes tables, contents and header, flushes and renames. `tables` must keep the rules of spec/format.md.
   void finish(const PackTables& tables);
 
  private:

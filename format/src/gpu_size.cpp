@@ -1,0 +1,50 @@
+#include "billow/format/gpu_size.h"
+
+#include "billow/format/brick.h"
+
+namespace billow::format {
+namespace {
+
+constexpr std::uint64_t kClassBytes[kBrickClassCount] = {128, 256, 512, 1024};
+// A rank (u16) for each mask word lets a child be found with one popcount.
+constexpr std::uint64_t kNode5IndexBytes = sizeof(Node5) + 1024 * sizeof(std::uint16_t);
+constexpr std::uint64_t kNode4IndexBytes = sizeof(Node4) + 128 * sizeof(std::uint16_t);
+
+}  // namespace
+
+std::uint64_t GpuBytes::total() const {
+  std::uint64_t sum = indexBytes + node3Bytes + maskBytes;
+  for (const std::uint64_t bytes : brickBytes) sum += bytes;
+  return sum;
+}
+
+CellBox cellBox(const GridFrame& gridFrame) {
+  CellBox box{};
+  for (int axis = 0; axis < 3; ++axis) {
+    if (gridFrame.activeMin[axis] > gridFrame.activeMax[axis]) return CellBox{};
+    box.min[axis] = static_cast<std::uint32_t>(gridFrame.activeMin[axis]) >> kNode3SpanLog2;
+    box.dim[axis] = (static_cast<std::uint32_t>(gridFrame.activeMax[axis]) >> kNode3SpanLog2) - box.min[axis] + 1;
+  }
+  return box;
+}
+
+GpuBytes gpuBytes(const GridFrame& gridFrame) {
+  GpuBytes bytes;
+  if (gridFrame.node5 == kNone) return bytes;
+  bytes.node3Bytes = std::uint64_t{gridFrame.node3Count} * sizeof(Node3);
+  bytes.maskBytes = std::uint64_t{gridFrame.maskCount} * sizeof(Mask3);
+  std::uint64_t payload = bytes.node3Bytes;
+  for (std::uint32_t i = 0; i < kBrickClassCount; ++i) {
+    bytes.brickBytes[i] = gridFrame.brickCount[i] * kClassBytes[i];
+    payload += bytes.brickBytes[i];
+  }
+  const std::uint64_t flat = cellBox(gridFrame).count() * sizeof(std::uint32_t);
+  const std::uint64_t tree = kNode5IndexBytes + gridFrame.node4Count * kNode4IndexBytes +
+                             std::uint64_t{gridFrame.childCount} * sizeof(std::uint32_t);
+  // A flat table costs one load a sample where the tree costs four, so it may be somewhat larger.
+  bytes.index = flat <= tree + payload / 4 ? GpuIndex::flat : GpuIndex::tree;
+  bytes.indexBytes = bytes.index == GpuIndex::flat ? flat : tree;
+  return bytes;
+}
+
+}  // namespace billow::format

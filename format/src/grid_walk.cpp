@@ -1,0 +1,376 @@
+#include "grid_walk.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <iterator>
+#include <utility>
+
+namespace billow::format {
+namespace {
+
+constexpr std::uint16_t kNode4Last = (1u << kNode4SpanLog2) - 1;
+constexpr std::uint16_t kNode5Last = (1u << kNode5SpanLog2) - 1;
+
+// What a unit is to the bricks: not used, inside of one, or the first of one of a class (kFirstOfClass + class).
+constexpr std::uint8_t kInsideBrick = 1;
+constexpr std::uint8_t kFirstOfClass = 2;
+
+std::uint32_t classOf(std::uint32_t bytes) {
+  return static_cast<std::uint32_t>(std::countr_zero(bytes / 128));
+}
+
+// What an item of another array is.
+constexpr std::uint8_t kReached = 1;
+constexpr std::uint8_t kBroken = 2;
+
+constexpr std::uint32_t number(Stream stream) {
+  return static_cast<std::uint32_t>(stream);
+}
+
+template <class T>
+const T* as(const std::byte* data) {
+  return reinterpret_cast<const T*>(data);
+}
+
+std::array<std::uint16_t, 3> childOrigin(std::uint32_t bit, std::uint32_t log2, std::uint32_t childSpanLog2) {
+  const std::uint32_t last = (1u << log2) - 1;
+  return {static_cast<std::uint16_t>((bit >> 2 * log2) << childSpanLog2),
+          static_cast<std::uint16_t>((bit >> log2 & last) << childSpanLog2),
+          static_cast<std::uint16_t>((bit & last) << childSpanLog2)};
+}
+
+}  // namespace
+
+ItemFinder::ItemFinder(const Pack& pack, std::span<const Page> pages) : pagesUsed_(pages.size()) {
+  for (std::uint32_t p = 0; p < pages.size(); ++p) {
+    const PageRecord& record = pack.pages()[pages[p].number];
+    for (std::uint32_t s = 0; s < kStreamCount; ++s) {
+      const StreamRange& run = record.streams[s];
+      if (run.count == 0) continue;
+      runs_[s].push_back(
+          {run.first, run.count, localCount_[s], p, pages[p].stream(record, static_cast<Stream>(s)).data()});
+      localCount_[s] += run.count;
+    }
+  }
+}
+
+ItemFinder::Found ItemFinder::find(Stream stream, std::uint32_t first, std::uint32_t count) {
+  const auto which = static_cast<std::uint32_t>(stream);
+  const std::vector<Run>& runs = runs_[which];
+  if (runs.empty()) return {};
+  const auto holds = [&](const Run& run) {
+    return first >= run.first && first - run.first < run.count && count <= run.count - (first - run.first);
+  };
+  if (!holds(runs[last_[which]])) {
+    const auto after = std::upper_bound(runs.begin(), runs.end(), first,
+                                        [](std::uint32_t value, const Run& run) { return value < run.first; });
+    if (after == runs.begin() || !holds(*(after - 1))) return {};
+    last_[which] = static_cast<std::size_t>(after - 1 - runs.begin());
+  }
+  const Run& run = runs[last_[which]];
+  pagesUsed_[run.page] = 1;
+  return {run.data + std::size_t{first - run.first} * kStreamItemBytes[which], run.local + (first - run.first)};
+}
+
+void GridWalk::Box::add(const Box& box, const std::array<std::uint16_t, 3>& origin) {
+  if (box.empty()) return;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    low[axis] = std::min(low[axis], static_cast<std::uint16_t>(origin[axis] + box.low[axis]));
+    high[axis] = std::max(high[axis], static_cast<std::uint16_t>(origin[axis] + box.high[axis]));
+  }
+}
+
+GridWalk::GridWalk(const Pack& pack, const StreamTotals& totals, const GridFrame& gridFrame, const Place& place,
+                   std::span<const Page> pages, IssueSink& sink)
+    : frame_(gridFrame), place_(place), totals_(totals), pages_(pages), sink_(sink), finder_(pack, pages) {
+  for (std::uint32_t s = 0; s < kStreamCount; ++s) reached_[s].resize(finder_.localCount(static_cast<Stream>(s)));
+  bricks_.resize(finder_.localCount(Stream::node3));
+  subtrees_.resize(finder_.localCount(Stream::node4));
+}
+
+bool GridWalk::check() {
+  const std::uint64_t before = sink_.errors();
+  if (frame_.node5 != kNone) {
+    const ItemFinder::Found found = finder_.find(Stream::node5, frame_.node5, 1);
+    if (found.data == nullptr) {
+      reportMissing("Node5", frame_.node5);
+      return false;
+    }
+    reached_[number(Stream::node5)][found.local] = kReached;
+    root_ = as<Node5>(found.data);
+    visitNode5(*root_);
+  }
+  // Totals of a tree in which something is missing say nothing.
+  if (sink_.errors() == before && !sink_.stopped()) checkTotals();
+  if (sink_.errors() == before && !sink_.stopped()) checkPagesNeeded();
+  return sink_.errors() == before;
+}
+
+Place GridWalk::itemPlace(std::string_view kind, std::uint64_t index) const {
+  Place place = place_;
+  place.nodeKind = kind;
+  place.node = index;
+  return place;
+}
+
+void GridWalk::reportMissing(std::string_view kind, std::uint64_t index) {
+  sink_.report(Rule::pageMissing, itemPlace(kind, index), "It lies in none of the pages that the grid frame lists.");
+}
+
+ItemFinder::Found GridWalk::findChild(const Parent& parent, std::uint32_t bit, Stream stream, std::string_view kind,
+                                      std::uint32_t index) {
+  const ItemFinder::Found found = finder_.find(stream, index, 1);
+  if (found.data != nullptr) return found;
+  if (index < totals_.count[number(stream)]) {
+    reportMissing(kind, index);
+  } else {
+    sink_.report(Rule::childIndex, itemPlace(parent.kind, parent.index),
+                 fmt::format("Child {} is {} {} of {}.", bit, kind, index, totals_.count[number(stream)]));
+  }
+  return found;
+}
+
+template <class Node>
+const std::uint32_t* GridWalk::childList(const Node& node, const Parent& parent, std::uint32_t& children) {
+  children = 0;
+  for (const std::uint32_t word : node.mask) children += static_cast<std::uint32_t>(std::popcount(word));
+  childCount_ += children;
+  // Readers of a flat table never look at a node's tile, so it may not differ from what they return.
+  const bool inactive = children < std::size(node.mask) * 32 && (node.flags & kNodeTileActive) == 0;
+  if (inactive && node.tile != frame_.background) {
+    sink_.report(Rule::nodeTile, itemPlace(parent.kind, parent.index),
+                 fmt::format("It is {}, the background {}.", node.tile, frame_.background));
+  }
+  if (children == 0) return nullptr;
+  const ItemFinder::Found list = finder_.find(Stream::child, node.childBegin, children);
+  if (list.data == nullptr) reportMissing("child", node.childBegin);
+  return as<std::uint32_t>(list.data);
+}
+
+void GridWalk::visitNode5(const Node5& node) {
+  std::uint32_t children = 0;
+  const std::uint32_t* list = childList(node, {"Node5", frame_.node5}, children);
+  if (children == 0 && (node.flags & kNodeTileActive) != 0) {
+    active_ = std::uint64_t{1} << 3 * kNode5SpanLog2;
+    box_ = {{0, 0, 0}, {kNode5Last, kNode5Last, kNode5Last}};
+  }
+  if (list == nullptr) return;
+  forEachBit(node.mask, [&](std::uint32_t bit) {
+    if (!sink_.stopped()) visitChild4(node, bit, *list++);
+  });
+}
+
+void GridWalk::visitChild4(const Node5& parent, std::uint32_t bit, std::uint32_t index) {
+  const ItemFinder::Found found = findChild({"Node5", frame_.node5}, bit, Stream::node4, "Node4", index);
+  if (found.data == nullptr) return;
+  const Node4& child = *as<Node4>(found.data);
+  SubtreeFacts& facts = subtrees_[found.local];
+  std::uint8_t& reached = reached_[number(Stream::node4)][found.local];
+  if (reached == 0) {
+    reached = kReached;
+    ++node4Count_;
+    visitNode4(child, index, facts);
+  }
+  if (!(child.min >= parent.min && child.max <= parent.max)) {
+    sink_.report(Rule::nodeConservative, itemPlace("Node5", frame_.node5),
+                 fmt::format("Node4 {} has [{}, {}], its parent [{}, {}].", index, child.min, child.max, parent.min,
+                             parent.max));
+  }
+  active_ += facts.active;
+  leafCount_ += facts.leaves;
+  box_.add(facts.box, childOrigin(bit, kNode5Log2, kNode4SpanLog2));
+}
+
+void GridWalk::visitNode4(const Node4& node, std::uint32_t index, SubtreeFacts& facts) {
+  std::uint32_t children = 0;
+  const std::uint32_t* list = childList(node, {"Node4", index}, children);
+  if (children == 0 && (node.flags & kNodeTileActive) != 0) {
+    facts.active = std::uint64_t{1} << 3 * kNode4SpanLog2;
+    facts.box = {{0, 0, 0}, {kNode4Last, kNode4Last, kNode4Last}};
+  }
+  if (list == nullptr) return;
+  forEachBit(node.mask, [&](std::uint32_t bit) {
+    if (!sink_.stopped()) visitChild3(node, index, bit, *list++, facts);
+  });
+}
+
+void GridWalk::visitChild3(const Node4& parent, std::uint32_t parentIndex, std::uint32_t bit, std::uint32_t index,
+                           SubtreeFacts& facts) {
+  const ItemFinder::Found found = findChild({"Node4", parentIndex}, bit, Stream::node3, "Node3", index);
+  if (found.data == nullptr) return;
+  const Node3& child = *as<Node3>(found.data);
+  BrickFacts& brick = bricks_[found.local];
+  std::uint8_t& reached = reached_[number(Stream::node3)][found.local];
+  if (reached == 0) {
+    ++node3Count_;
+    reached = visitNode3(child, index, brick) ? kReached : kBroken;
+  }
+  if (reached == kBroken) return;
+  ++facts.leaves;
+  facts.active += brick.active;
+  if (brick.active > 0) {
+    facts.box.add({{brick.low[0], brick.low[1], brick.low[2]}, {brick.high[0], brick.high[1], brick.high[2]}},
+                  childOrigin(bit, kNode4Log2, kNode3SpanLog2));
+  }
+  const auto contained = [&] { return brick.min >= parent.min && brick.max <= parent.max; };
+  if (contained()) return;
+  if (!brick.exact) measureExactly(child, brick);
+  if (contained()) return;
+  sink_.report(
+      Rule::nodeConservative, itemPlace("Node4", parentIndex),
+      fmt::format("Node3 {} has [{}, {}], its parent [{}, {}].", index, brick.min, brick.max, parent.min, parent.max));
+}
+
+bool GridWalk::findParts(const Node3& node, const Mask3*& mask, std::span<const std::byte>& brick) {
+  mask = nullptr;
+  brick = {};
+  const std::uint32_t bytes = brickBytes(encodingOf(node)).value_or(0);
+  if (bytes > 0) {
+    const ItemFinder::Found found = finder_.find(Stream::unit, unitOf(node), bytes / kStreamItemBytes[0]);
+    if (found.data == nullptr) return false;
+    brick = {found.data, bytes};
+  }
+  if (node.mask == kMaskAll || node.mask == kMaskTexel) return true;
+  mask = as<Mask3>(finder_.find(Stream::mask, node.mask, 1).data);
+  return mask != nullptr;
+}
+
+bool GridWalk::visitNode3(const Node3& node, std::uint32_t index, BrickFacts& facts) {
+  const std::uint32_t bytes = brickBytes(encodingOf(node)).value_or(0);
+  if (bytes > 0) {
+    const ItemFinder::Found found = finder_.find(Stream::unit, unitOf(node), bytes / kStreamItemBytes[0]);
+    if (found.data == nullptr) return reportMissing("brick", unitOf(node)), false;
+    if (!countBrick(found.local, bytes)) {
+      sink_.report(Rule::brickOverlap, itemPlace("Node3", index), "Its units are in part those of another brick.");
+    }
+  }
+  if (node.mask == kMaskTexel) {
+    measureExactly(node, facts);
+  } else {
+    Mask3 all;
+    std::fill(std::begin(all.words), std::end(all.words), 0xffffffffu);
+    const Mask3* mask = &all;
+    if (node.mask != kMaskAll) {
+      const ItemFinder::Found found = finder_.find(Stream::mask, node.mask, 1);
+      if (found.data == nullptr) return reportMissing("mask", node.mask), false;
+      mask = as<Mask3>(found.data);
+      maskCount_ += std::exchange(reached_[number(Stream::mask)][found.local], kReached) == 0 ? 1 : 0;
+    }
+    measureActive(*mask, facts);
+    boundLoosely(node, facts);
+  }
+  if (facts.active < kBrickVoxels && node.tile != frame_.background) {
+    sink_.report(Rule::brickTile, itemPlace("Node3", index),
+                 fmt::format("It is {}, the background {}.", node.tile, frame_.background));
+  }
+  return true;
+}
+
+// Counts a brick when it is met first; false where it cuts another.
+bool GridWalk::countBrick(std::uint32_t local, std::uint32_t bytes) {
+  std::vector<std::uint8_t>& units = reached_[number(Stream::unit)];
+  const std::uint32_t brickClass = classOf(bytes);
+  const auto first = static_cast<std::uint8_t>(kFirstOfClass + brickClass);
+  if (units[local] == first) return true;
+  const std::span<std::uint8_t> own = std::span(units).subspan(local, bytes / kStreamItemBytes[0]);
+  const bool fresh = std::all_of(own.begin(), own.end(), [](std::uint8_t unit) { return unit == 0; });
+  if (!fresh) return false;
+  std::fill(own.begin(), own.end(), kInsideBrick);
+  own[0] = first;
+  ++brickCount_[brickClass];
+  return true;
+}
+
+void GridWalk::measureExactly(const Node3& node, BrickFacts& facts) {
+  const Mask3* mask = nullptr;
+  std::span<const std::byte> brick;
+  if (!findParts(node, mask, brick)) return;
+  Values values;
+  Mask3 active;
+  decodeBrick(node, mask, brick, values, active);
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  facts.min = *low;
+  facts.max = *high;
+  facts.exact = true;
+  measureActive(active, facts);
+}
+
+// Bounds that need no decoding: what the brick can hold at most. Mostly they do.
+void GridWalk::boundLoosely(const Node3& node, BrickFacts& facts) {
+  const float high = reconstruct(node.lo, node.scale, encodingOf(node) == kEncodingR16 ? 65535 : 255);
+  const bool none = facts.active == 0, all = facts.active == kBrickVoxels;
+  facts.min = none ? node.tile : all ? node.lo : std::min(node.lo, node.tile);
+  facts.max = none ? node.tile : all ? high : std::max(high, node.tile);
+  facts.exact = none || encodingOf(node) == kEncodingConstant;
+}
+
+void GridWalk::measureActive(const Mask3& mask, BrickFacts& facts) {
+  std::uint32_t even = 0, odd = 0, slabs = 0, count = 0;
+  for (std::uint32_t x = 0; x < 8; ++x) {
+    even |= mask.words[2 * x];
+    odd |= mask.words[2 * x + 1];
+    count += static_cast<std::uint32_t>(std::popcount(mask.words[2 * x]) + std::popcount(mask.words[2 * x + 1]));
+    if ((mask.words[2 * x] | mask.words[2 * x + 1]) != 0) slabs |= 1u << x;
+  }
+  facts.active = static_cast<std::uint16_t>(count);
+  if (count == 0) return;
+  std::uint32_t rows = 0, columns = 0;
+  for (std::uint32_t y = 0; y < 8; ++y) {
+    const std::uint32_t row = (y < 4 ? even : odd) >> (8 * (y & 3)) & 0xffu;
+    columns |= row;
+    if (row != 0) rows |= 1u << y;
+  }
+  const std::uint32_t axes[3] = {slabs, rows, columns};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    facts.low[axis] = static_cast<std::uint8_t>(std::countr_zero(axes[axis]));
+    facts.high[axis] = static_cast<std::uint8_t>(31 - std::countl_zero(axes[axis]));
+  }
+}
+
+void GridWalk::checkTotals() {
+  const auto compare = [&](std::string_view what, std::uint64_t said, std::uint64_t is) {
+    if (said != is) sink_.report(Rule::counts, place_, fmt::format("It says {} {}, and reaches {}.", said, what, is));
+  };
+  compare("Node4", frame_.node4Count, node4Count_);
+  compare("Node3", frame_.node3Count, node3Count_);
+  compare("masks", frame_.maskCount, maskCount_);
+  compare("child list entries", frame_.childCount, childCount_);
+  constexpr std::string_view kClassNames[kBrickClassCount] = {"BC7 bricks", "BC4 bricks", "R8 bricks", "R16 bricks"};
+  for (std::uint32_t i = 0; i < kBrickClassCount; ++i) compare(kClassNames[i], frame_.brickCount[i], brickCount_[i]);
+  if (frame_.activeVoxels != active_) {
+    sink_.report(Rule::activeVoxels, place_, fmt::format("It says {}, and reaches {}.", frame_.activeVoxels, active_));
+  }
+  checkBox();
+  if (root_ != nullptr && !(frame_.valueMin <= root_->min && root_->max <= frame_.valueMax)) {
+    sink_.report(
+        Rule::valueRange, place_,
+        fmt::format("It says [{}, {}], its Node5 [{}, {}].", frame_.valueMin, frame_.valueMax, root_->min, root_->max));
+  }
+}
+
+void GridWalk::checkBox() {
+  if (box_.empty()) return;
+  bool holds = true, tight = true;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    holds &= frame_.activeMin[axis] <= box_.low[axis] && frame_.activeMax[axis] >= box_.high[axis];
+    tight &= frame_.activeMin[axis] == box_.low[axis] && frame_.activeMax[axis] == box_.high[axis];
+  }
+  if (tight) return;
+  sink_.report(holds ? Rule::activeBoxLoose : Rule::activeBox, place_,
+               fmt::format("The active voxels fill [{}, {}] x [{}, {}] x [{}, {}].", box_.low[0], box_.high[0],
+                           box_.low[1], box_.high[1], box_.low[2], box_.high[2]));
+}
+
+void GridWalk::checkPagesNeeded() {
+  const std::span<const std::uint8_t> used = finder_.pagesUsed();
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    if (used[i] != 0) continue;
+    Place place = place_;
+    place.page = pages_[i].number;
+    sink_.report(Rule::pageSuperfluous, place, "The grid frame reaches nothing in it.");
+  }
+}
+
+}  // namespace billow::format

@@ -1,0 +1,83 @@
+#include "page_compressor.h"
+
+#include <zstd.h>
+
+#include <algorithm>
+#include <new>
+#include <stdexcept>
+#include <utility>
+
+namespace billow::format {
+namespace {
+
+using Context = std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)>;
+
+CompressedPage compress(ZSTD_CCtx* context, std::vector<std::byte> raw, int level) {
+  CompressedPage page;
+  page.stored.resize(ZSTD_compressBound(raw.size()));
+  const std::size_t size =
+      ZSTD_compressCCtx(context, page.stored.data(), page.stored.size(), raw.data(), raw.size(), level);
+  if (ZSTD_isError(size)) throw std::runtime_error(ZSTD_getErrorName(size));
+  if (size >= raw.size()) return {std::move(raw), Codec::raw};
+  page.codec = Codec::zstd;
+  page.stored.resize(size);
+  return page;
+}
+
+}  // namespace
+
+PageCompressor::PageCompressor(int zstdLevel)
+    : level_(zstdLevel), threadLimit_(std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, 8)) {}
+
+PageCompressor::~PageCompressor() {
+  {
+    const std::lock_guard lock(mutex_);
+    closing_ = true;
+  }
+  changed_.notify_all();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+void PageCompressor::submit(std::vector<std::byte> raw) {
+  auto job = std::make_shared<Job>();
+  job->raw = std::move(raw);
+  jobs_.push_back(job);
+  {
+    const std::lock_guard lock(mutex_);
+    waiting_.push_back(std::move(job));
+  }
+  changed_.notify_all();
+  if (threads_.size() < std::min(threadLimit_, jobs_.size())) threads_.emplace_back([this] { work(); });
+}
+
+CompressedPage PageCompressor::take() {
+  const std::shared_ptr<Job> job = std::move(jobs_.front());
+  jobs_.pop_front();
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return job->done; });
+  if (job->failure) std::rethrow_exception(job->failure);
+  return std::move(job->page);
+}
+
+void PageCompressor::work() {
+  const Context context(ZSTD_createCCtx(), &ZSTD_freeCCtx);
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, [&] { return closing_ || !waiting_.empty(); });
+    if (closing_) return;
+    const std::shared_ptr<Job> job = std::move(waiting_.front());
+    waiting_.pop_front();
+    lock.unlock();
+    try {
+      if (!context) throw std::bad_alloc();
+      job->page = compress(context.get(), std::move(job->raw), level_);
+    } catch (...) {
+      job->failure = std::current_exception();
+    }
+    lock.lock();
+    job->done = true;
+    changed_.notify_all();
+  }
+}
+
+}  // namespace billow::format
