@@ -52,7 +52,7 @@ struct ImportOptions {
 
 struct PlannedGrid {
   std::string name;    // "density", or "velocity.x" for a component of a vec3 grid
-  std::string source;  // the OpenVDB grid's unique name
+  std::string source;  // the grid's name in the files; repeated ones get _1, _2, ... and nameless ones "unnamed"
   std::uint32_t component = format::kNone;
   format::Role role = format::Role::none;
   format::SourceType sourceType = format::SourceType::float32;
@@ -60,7 +60,8 @@ struct PlannedGrid {
 
 struct PlannedFrame {
   std::int32_t number = 0;
-  std::vector<std::string> files;  // empty: missing in the source; several: their grids are merged
+  std::vector<std::string> files;  // several: their grids are merged; a held frame's are those of the one it repeats;
+                                   // none where it is blank
   std::uint32_t flags = 0;         // format::kFrameHeld, kFrameBlank
 };
 

@@ -27,7 +27,7 @@ struct VdbType {
 };
 
 struct VdbGrid {
-  std::string uniqueName;  // as OpenVDB's io::File wants it
+  std::string uniqueName;  // as the file has it: the name, and a number where several grids share it
   std::string name;        // "density"; without a name "unnamed"; repeated ones get _1, _2, ... in the file's order
   std::string treeType;    // without the suffix for half
   bool half = false;
