@@ -40,7 +40,8 @@ TexelRange coverRange(ValueRange range, std::uint32_t first, std::uint32_t last)
   float scale = static_cast<float>(step);
   // Near the denormals one unit of `scale` is a large part of it: take the next above, or the top would be cut.
   if (static_cast<double>(scale) * steps < width) scale = std::nextafter(scale, std::numeric_limits<float>::max());
-  const auto lo = static_cast<float>(static_cast<double>(range.min) - static_cast<double>(scale) * first);
+  const double wanted = static_cast<double>(range.min) - static_cast<double>(scale) * first;
+  const float lo = wanted < -kLargest ? -std::numeric_limits<float>::infinity() : static_cast<float>(wanted);
   while (std::isfinite(lo) && !std::isfinite(format::reconstruct(lo, scale, last))) scale = std::nextafter(scale, 0.0f);
   return {lo, scale};
 }
@@ -89,7 +90,8 @@ void measure(const BrickSource& brick, const format::Texels& texels, Candidate& 
   }
   candidate.squaredError = 0;
   for (const double lane : squared) candidate.squaredError += lane;
-  candidate.maxError = static_cast<float>(*std::max_element(largest, largest + kLanes));
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  candidate.maxError = static_cast<float>(std::min(kLargest, *std::max_element(largest, largest + kLanes)));
 }
 
 }  // namespace billow::compiler

@@ -1,0 +1,429 @@
+// Every encoding over ordinary and extreme bricks: what is promised is what the reader reconstructs, and every build
+// writes the same bytes.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "brick_corpus.h"
+#include "encode/bc7_block.h"
+#include "encode/texel_range.h"
+#include "stages.h"
+
+namespace {
+
+using namespace billow;
+using compiler::Candidate;
+using tests::Brick;
+using tests::makeBrick;
+
+constexpr float kTile = -77.0f;
+
+compiler::BrickSource sourceOf(const Brick& brick) {
+  return {&brick.values, &brick.active, brick.activeCount, kTile};
+}
+
+struct Encoder {
+  std::string name;
+  std::function<void(const compiler::BrickSource&, Candidate&)> encode;
+};
+
+std::vector<Encoder> allEncoders() {
+  std::vector<Encoder> encoders = {{"constant", compiler::encodeConstant},
+                                   {"R8", compiler::encodeR8},
+                                   {"R16", compiler::encodeR16},
+                                   {"BC4 best axis", compiler::encodeBc4BestAxis}};
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    encoders.push_back({"BC4 axis " + std::to_string(axis), [axis](const auto& source, Candidate& out) {
+                          compiler::encodeBc4(source, format::kEncodingBc4Z + axis, out);
+                        }});
+    encoders.push_back({"BC7 axis " + std::to_string(axis), [axis](const auto& source, Candidate& out) {
+                          compiler::encodeBc7(source, format::kEncodingBc7Z + axis, 1, out);
+                        }});
+  }
+  for (int effort = 0; effort <= 5; ++effort) {
+    encoders.push_back({"BC7 best axis, effort " + std::to_string(effort),
+                        [effort](const auto& src, Candidate& out) { compiler::encodeBc7BestAxis(src, effort, out); }});
+  }
+  return encoders;
+}
+
+struct NamedBrick {
+  std::string name;
+  Brick brick;
+};
+
+bool never(std::uint32_t) {
+  return false;
+}
+
+std::vector<NamedBrick> corpus() {
+  const auto random = [](std::uint32_t seed, float low, float high) {
+    return [=](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+      return low + (high - low) * tests::randomValue(seed, format::voxelIndex(x, y, z));
+    };
+  };
+  const auto ramp = [](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+    return static_cast<float>(x + 2 * y + 4 * z) / 64.0f;
+  };
+  const auto parity = [](std::uint32_t i) { return ((i >> 6 ^ i >> 3 ^ i) & 1u) != 0; };
+  const auto sparse = [](std::uint32_t i) { return tests::hash(i, 5, 6) % 20 == 0; };
+  const auto half = [](std::uint32_t i) { return tests::hash(i, 7, 8) % 2 == 0; };
+  constexpr float kLargest = std::numeric_limits<float>::max();
+  constexpr float kDenormal = std::numeric_limits<float>::denorm_min();
+  std::vector<NamedBrick> bricks = {
+      {"zero", makeBrick([](auto...) { return 0.0f; })},
+      {"constant", makeBrick([](auto...) { return 0.3f; })},
+      {"constant, half active", makeBrick([](auto...) { return -5.5f; }, half)},
+      {"slabs of two values", makeBrick([](std::uint32_t x, auto...) { return x < 4 ? 0.25f : 3.75f; })},
+      {"checkerboard of two values",
+       makeBrick([&](auto x, auto y, auto z) { return parity(format::voxelIndex(x, y, z)) ? 1.0f : 0.0f; })},
+      {"checkerboard of activity", makeBrick(ramp, parity)},
+      {"one active voxel", makeBrick(ramp, [](std::uint32_t i) { return i == 300; })},
+      {"two active voxels", makeBrick(ramp, [](std::uint32_t i) { return i == 0 || i == 511; })},
+      {"none active", makeBrick(ramp, never)},
+      {"ramp", makeBrick(ramp)},
+      {"ramp, sparse", makeBrick(ramp, sparse)},
+      {"noise", makeBrick(random(1, 0.0f, 1.0f))},
+      {"noise, half active", makeBrick(random(2, -3.0f, 9.0f), half)},
+      {"noise, sparse", makeBrick(random(3, 0.0f, 100.0f), sparse)},
+      {"denormal noise", makeBrick(random(4, 0.0f, 1e-40f), half)},
+      {"two denormals", makeBrick([&](auto x, auto...) { return x < 3 ? 0.0f : kDenormal; }, half)},
+      {"tiny noise", makeBrick(random(5, 0.0f, 1e-8f))},
+      {"huge noise", makeBrick(random(6, -1e37f, 1e37f), half)},
+      {"top of the range", makeBrick(random(7, 1e38f, kLargest))},
+      {"bottom of the range",
+       makeBrick([&](auto x, auto y, auto z) { return x < 2 ? -kLargest : random(8, -3e38f, -1e38f)(x, y, z); }, half)},
+      {"a step of one unit",
+       makeBrick([](auto x, auto...) { return x < 4 ? 1e6f : std::nextafter(1e6f, 2e6f); }, half)},
+      {"an outlier", makeBrick([](auto x, auto y, auto z) { return x + y + z == 0 ? 1e6f : 0.001f; })},
+  };
+  return bricks;
+}
+
+// Decodes as a reader would, and holds the candidate to its word.
+void checkPromise(const Brick& brick, const Candidate& candidate) {
+  std::uint32_t mask = 0;  // an index
+  if (candidate.texelMask) {
+    mask = format::kMaskTexel;
+  } else if (brick.activeCount == format::kBrickVoxels) {
+    mask = format::kMaskAll;
+  }
+  const format::Node3 node{candidate.encoding << format::kEncodingShift, mask, candidate.lo, candidate.scale, kTile, 0};
+  const auto bytes = format::brickBytes(candidate.encoding);
+  ASSERT_TRUE(bytes.has_value());
+  format::Values values;
+  format::Mask3 active;
+  format::decodeBrick(node, &brick.active, std::span(candidate.payload).first(*bytes), values, active);
+  ASSERT_EQ(std::memcmp(&active, &brick.active, sizeof active), 0);
+  double squared = 0, largest = 0;
+  for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) {
+    if (!format::maskBit(active, i)) {
+      ASSERT_EQ(values[i], kTile) << i;
+      continue;
+    }
+    ASSERT_TRUE(std::isfinite(values[i])) << i;
+    const double error = static_cast<double>(values[i]) - static_cast<double>(brick.values[i]);
+    squared += error * error;
+    largest = std::max(largest, std::abs(error));
+  }
+  EXPECT_NEAR(candidate.squaredError, squared, 1e-12 * squared);
+  const double highest = std::numeric_limits<float>::max();
+  EXPECT_EQ(candidate.maxError, static_cast<float>(std::min(largest, highest)));
+  EXPECT_TRUE(std::isfinite(candidate.scale));
+  EXPECT_GE(candidate.scale, 0.0f);
+}
+
+TEST(Encode, whatIsPromisedIsWhatIsDecoded) {
+  for (const NamedBrick& named : corpus()) {
+    for (const Encoder& encoder : allEncoders()) {
+      SCOPED_TRACE(named.name + " as " + encoder.name);
+      Candidate candidate;
+      encoder.encode(sourceOf(named.brick), candidate);
+      checkPromise(named.brick, candidate);
+    }
+  }
+}
+
+TEST(Encode, randomMasksKeepThePromise) {
+  for (std::uint32_t seed = 0; seed < 60; ++seed) {
+    const Brick brick = makeBrick(
+        [=](auto x, auto y, auto z) {
+          const float noise = tests::randomValue(seed, format::voxelIndex(x, y, z));
+          return static_cast<float>(x * y) * 0.1f + noise * static_cast<float>(seed % 7);
+        },
+        [=](std::uint32_t i) { return tests::hash(i, seed, 99) % 16 <= seed % 17; });
+    for (const Encoder& encoder : allEncoders()) {
+      SCOPED_TRACE(std::to_string(seed) + " as " + encoder.name);
+      Candidate candidate;
+      encoder.encode(sourceOf(brick), candidate);
+      checkPromise(brick, candidate);
+    }
+  }
+}
+
+// Half a step, and what single precision adds: a rounding of the product, of the sum, and of lo.
+double rawBound(const Brick& brick, const Candidate& candidate) {
+  float magnitude = std::abs(candidate.lo);
+  for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) {
+    if (format::maskBit(brick.active, i)) magnitude = std::max(magnitude, std::abs(brick.values[i]));
+  }
+  const double unit = static_cast<double>(magnitude) * std::numeric_limits<float>::epsilon();
+  return 0.501 * static_cast<double>(candidate.scale) + 2 * unit;
+}
+
+TEST(Encode, rawTexelsAreWithinHalfAStep) {
+  for (const NamedBrick& named : corpus()) {
+    SCOPED_TRACE(named.name);
+    // Below the lowest float there is no room for the step that tells inactive voxels: such a brick needs a stored
+    // mask.
+    const bool room = named.name != "bottom of the range";
+    for (const auto encode : {compiler::encodeR8, compiler::encodeR16}) {
+      Candidate candidate;
+      encode(sourceOf(named.brick), candidate);
+      EXPECT_LE(candidate.maxError, rawBound(named.brick, candidate));
+      EXPECT_EQ(candidate.texelMask, room && named.brick.activeCount < format::kBrickVoxels);
+    }
+  }
+}
+
+TEST(Encode, aRangeBeyondSinglePrecisionStaysFinite) {
+  constexpr float kLargest = std::numeric_limits<float>::max();
+  const Brick brick = makeBrick([](auto x, auto...) { return x < 4 ? -kLargest : kLargest; });
+  for (const Encoder& encoder : allEncoders()) {
+    SCOPED_TRACE(encoder.name);
+    Candidate candidate;
+    encoder.encode(sourceOf(brick), candidate);
+    checkPromise(brick, candidate);
+  }
+}
+
+TEST(Encode, rangeCoversItsEnds) {
+  const float ends[] = {0.0f, 1e-45f, 1e-41f, 3e-39f, 1e-8f, 0.1f, 1.0f, 255.0f, 1e6f, 1e37f, 3e38f};
+  for (const float low : ends) {
+    for (const float high : ends) {
+      if (!(low < high)) continue;
+      for (const std::uint32_t last : {255u, 65535u}) {
+        const compiler::TexelRange range = compiler::coverRange({low, high}, 0, last);
+        EXPECT_EQ(range.lo, low);
+        const float top = format::reconstruct(range.lo, range.scale, last);
+        EXPECT_TRUE(std::isfinite(top));
+        EXPECT_NEAR(std::max(top, high), top, static_cast<double>(high) * 1.2e-7) << low << ' ' << high;
+      }
+    }
+  }
+}
+
+TEST(Encode, oneValueIsExactInEveryEncoding) {
+  for (const NamedBrick& named : corpus()) {
+    if (named.name != "zero" && named.name != "constant" && named.name != "constant, half active" &&
+        named.name != "one active voxel") {
+      continue;
+    }
+    for (const Encoder& encoder : allEncoders()) {
+      SCOPED_TRACE(named.name + " as " + encoder.name);
+      Candidate candidate;
+      encoder.encode(sourceOf(named.brick), candidate);
+      EXPECT_EQ(candidate.squaredError, 0.0);
+      EXPECT_EQ(candidate.maxError, 0.0f);
+    }
+  }
+}
+
+TEST(Encode, twoValuesInSlabsAreNearlyExact) {
+  const Brick brick = makeBrick([](std::uint32_t x, auto...) { return x < 4 ? 0.0f : 255.0f; });
+  for (const Encoder& encoder : allEncoders()) {
+    if (encoder.name == "constant") continue;
+    SCOPED_TRACE(encoder.name);
+    Candidate candidate;
+    encoder.encode(sourceOf(brick), candidate);
+    EXPECT_LE(candidate.maxError, 255.0f * std::numeric_limits<float>::epsilon());
+  }
+}
+
+TEST(Encode, constantIsTheMean) {
+  const Brick brick = makeBrick([](std::uint32_t x, auto...) { return static_cast<float>(x); });
+  Candidate candidate;
+  compiler::encodeConstant(sourceOf(brick), candidate);
+  EXPECT_EQ(candidate.lo, 3.5f);
+  EXPECT_EQ(candidate.maxError, 3.5f);
+  EXPECT_DOUBLE_EQ(candidate.squaredError, 512 * 5.25);  // (8 * 8 - 1) / 12 a voxel
+}
+
+TEST(Encode, bc4IsWithinAStepOfItsBlock) {
+  for (const NamedBrick& named : corpus()) {
+    SCOPED_TRACE(named.name);
+    Candidate candidate;
+    compiler::encodeBc4BestAxis(sourceOf(named.brick), candidate);
+    // Eight steps over at most the brick's range, ends and decoded values each rounded to a texel.
+    const double bound = (255.0 / 14 + 1) * static_cast<double>(candidate.scale);
+    const double unit = std::abs(static_cast<double>(candidate.lo)) * 1.2e-7;
+    EXPECT_LE(candidate.squaredError, named.brick.activeCount * (bound + unit) * (bound + unit));
+  }
+}
+
+TEST(Encode, bestAxisIsOneOfTheThree) {
+  for (const NamedBrick& named : corpus()) {
+    SCOPED_TRACE(named.name);
+    Candidate best, same;
+    compiler::encodeBc7BestAxis(sourceOf(named.brick), 1, best);
+    compiler::encodeBc7(sourceOf(named.brick), best.encoding, 1, same);
+    EXPECT_EQ(std::memcmp(best.payload.data(), same.payload.data(), 128), 0);
+    EXPECT_EQ(best.squaredError, same.squaredError);
+    compiler::encodeBc4BestAxis(sourceOf(named.brick), best);
+    compiler::encodeBc4(sourceOf(named.brick), best.encoding, same);
+    EXPECT_EQ(std::memcmp(best.payload.data(), same.payload.data(), 256), 0);
+  }
+}
+
+TEST(Encode, bestAxisFollowsTheLayers) {
+  // Independent noise in each layer along one axis. Packing that axis costs nothing: each channel is one layer,
+  // constant. BC4 blocks must lie within a layer, so their "packed" axis is the same.
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    const Brick brick = makeBrick([=](auto... at) {
+      const std::uint32_t coordinate[] = {at...};
+      return tests::randomValue(axis, coordinate[axis]);
+    });
+    Candidate candidate;
+    compiler::encodeBc7BestAxis(sourceOf(brick), 0, candidate);
+    EXPECT_EQ(format::packedAxis(candidate.encoding), axis);
+    compiler::encodeBc4BestAxis(sourceOf(brick), candidate);
+    EXPECT_EQ(format::packedAxis(candidate.encoding), axis);
+    EXPECT_LE(candidate.maxError, 0.51f * candidate.scale);
+  }
+}
+
+double totalError(const std::vector<Brick>& bricks, int effort) {
+  double total = 0;
+  Candidate candidate;
+  for (const Brick& brick : bricks) {
+    compiler::encodeBc7BestAxis(sourceOf(brick), effort, candidate);
+    total += candidate.squaredError;
+  }
+  return total;
+}
+
+TEST(Encode, effortPays) {
+  std::vector<Brick> bricks = tests::cloudBricks(32);
+  for (const NamedBrick& named : corpus()) {
+    if (named.name.starts_with("noise")) bricks.push_back(named.brick);
+  }
+  double before = std::numeric_limits<double>::max();
+  for (int effort = 0; effort <= 5; ++effort) {
+    const double total = totalError(bricks, effort);
+    EXPECT_LT(total, before) << effort;
+    before = total;
+  }
+}
+
+TEST(Encode, smoothCloudReachesItsPsnr) {
+  const std::vector<Brick> bricks = tests::cloudBricks(128);
+  float highest = 0;
+  std::uint64_t voxels = 0;
+  for (const Brick& brick : bricks) {
+    voxels += brick.activeCount;
+    for (const float value : brick.values) highest = std::max(highest, value);
+  }
+  const auto psnr = [&](double squared) {
+    return 20 * std::log10(static_cast<double>(highest) / std::sqrt(squared / static_cast<double>(voxels)));
+  };
+  EXPECT_GT(psnr(totalError(bricks, 0)), 0.0);
+  EXPECT_GT(psnr(totalError(bricks, 1)), 0.0);
+  EXPECT_GT(psnr(totalError(bricks, 3)), 0.0);
+}
+
+TEST(Encode, everyModeIsUsed) {
+  std::uint32_t used[8] = {};
+  std::vector<Brick> bricks = tests::cloudBricks(48);
+  for (const NamedBrick& named : corpus()) bricks.push_back(named.brick);
+  // One slice in four unlike the others, the others smooth: what modes 4 and 5 are for.
+  for (std::uint32_t seed = 0; seed < 4; ++seed) {
+    bricks.push_back(makeBrick([=](auto x, auto y, auto z) {
+      const float noise = tests::randomValue(seed, format::voxelIndex(x, y, z));
+      return (z & 3) == seed ? noise : static_cast<float>(x + y) / 16.0f;
+    }));
+  }
+  Candidate candidate;
+  for (const Brick& brick : bricks) {
+    compiler::encodeBc7(sourceOf(brick), format::kEncodingBc7Z, 4, candidate);
+    for (std::size_t b = 0; b < 8; ++b) {
+      ++used[std::countr_zero(std::to_integer<std::uint8_t>(candidate.payload[16 * b]))];
+    }
+  }
+  for (const int mode : {0, 1, 2, 3}) EXPECT_EQ(used[mode], 0u) << mode;
+  for (const int mode : {4, 5, 6, 7}) EXPECT_GT(used[mode], 0u) << mode;
+}
+
+// The search minimises what the decoder will give, not an approximation of it.
+TEST(Encode, errorOfAFitIsThatOfItsBlock) {
+  for (std::uint32_t seed = 0; seed < 300; ++seed) {
+    compiler::Plane plane;
+    plane.uniform = seed % 3 == 0;
+    for (std::uint32_t c = 0; c < 4; ++c) {
+      for (std::uint32_t i = 0; i < 16; ++i) {
+        const float noise = tests::randomValue(seed, 16 * c + i);
+        const float smooth = static_cast<float>((i & 3) + (i >> 2) + c) / 9.0f;
+        plane.value[c][i >> 2][i & 3] = 255.0f * (seed % 2 == 0 ? noise : 0.8f * smooth + 0.2f * noise);
+        plane.weight[c][i >> 2][i & 3] = plane.uniform || tests::hash(seed, c, i) % 4 != 0 ? 1.0f : 0.0f;
+      }
+    }
+    const compiler::Bc7Search search = compiler::bc7Search(static_cast<int>(seed % 6));
+    compiler::Bc7Fit fits[3];
+    fits[0] = compiler::fitMode6(plane, search);
+    fits[1].error = fits[2].error = 1e30f;
+    fits[1].line[0] = fits[0].line[0];
+    fits[1].steps = fits[0].steps;
+    if (search.rotations > 0) compiler::tryModes4And5(plane, search, fits[1]);
+    if (search.partitions > 0) compiler::tryMode7(plane, search, fits[2]);
+    for (const compiler::Bc7Fit& fit : fits) {
+      if (fit.error >= 1e30f) continue;
+      std::byte block[16];
+      compiler::packBlock(fit, block);
+      std::uint8_t rgba[16][4];
+      format::decodeBc7Block(block, rgba);
+      double squared = 0;
+      for (std::uint32_t i = 0; i < 16; ++i) {
+        for (std::uint32_t c = 0; c < 4; ++c) {
+          const double error = rgba[i][c] - static_cast<double>(plane.value[c][i >> 2][i & 3]);
+          squared += error * error * static_cast<double>(plane.weight[c][i >> 2][i & 3]);
+        }
+      }
+      EXPECT_NEAR(static_cast<double>(fit.error), squared, 1e-4 * squared + 1e-4) << seed << " mode " << fit.mode;
+    }
+  }
+}
+
+// 64-bit FNV-1a over everything that reaches a pack, for a fixed set of bricks. gcc, clang, debug, release and any CPU
+// must agree on it; it changes only when an encoder is changed on purpose.
+TEST(Encode, everyBuildWritesTheSameBytes) {
+  std::vector<Brick> bricks = tests::cloudBricks(48);
+  for (const NamedBrick& named : corpus()) bricks.push_back(named.brick);
+  std::uint64_t digest = 0xcbf29ce484222325u;
+  const auto add = [&](const void* data, std::size_t size) {
+    const auto* bytes = static_cast<const unsigned char*>(data);
+    for (std::size_t i = 0; i < size; ++i) digest = (digest ^ bytes[i]) * 0x100000001b3u;
+  };
+  Candidate candidate;
+  for (const Brick& brick : bricks) {
+    for (const Encoder& encoder : allEncoders()) {
+      encoder.encode(sourceOf(brick), candidate);
+      add(&candidate.encoding, sizeof candidate.encoding);
+      add(&candidate.lo, sizeof candidate.lo);
+      add(&candidate.scale, sizeof candidate.scale);
+      add(&candidate.squaredError, sizeof candidate.squaredError);
+      add(&candidate.maxError, sizeof candidate.maxError);
+      add(candidate.payload.data(), *format::brickBytes(candidate.encoding));
+    }
+  }
+  EXPECT_EQ(digest, 0u);
+}
+
+}  // namespace
