@@ -13,9 +13,11 @@ namespace {
 constexpr std::uint16_t kNode4Last = (1u << kNode4SpanLog2) - 1;
 constexpr std::uint16_t kNode5Last = (1u << kNode5SpanLog2) - 1;
 
-// What a unit is to the bricks: not used, inside of one, or the first of one of a class (kFirstOfClass + class).
+// What a unit is to the bricks: not used, inside of one, or the first of one (kFirstUnit, with a bit for each axis by
+// which it is packed: bricks that differ in that alone may share their bytes, and count as two) of a class.
 constexpr std::uint8_t kInsideBrick = 1;
-constexpr std::uint8_t kFirstOfClass = 2;
+constexpr std::uint8_t kFirstUnit = 0x80;
+constexpr std::uint32_t kClassShift = 4;
 
 std::uint32_t classOf(std::uint32_t bytes) {
   return static_cast<std::uint32_t>(std::countr_zero(bytes / 128));
@@ -242,7 +244,7 @@ bool GridWalk::visitNode3(const Node3& node, std::uint32_t index, BrickFacts& fa
   if (bytes > 0) {
     const ItemFinder::Found found = finder_.find(Stream::unit, unitOf(node), bytes / kStreamItemBytes[0]);
     if (found.data == nullptr) return reportMissing("brick", unitOf(node)), false;
-    if (!countBrick(found.local, bytes)) {
+    if (!countBrick(found.local, encodingOf(node), bytes)) {
       sink_.report(Rule::brickOverlap, itemPlace("Node3", index), "Its units are in part those of another brick.");
     }
   }
@@ -269,16 +271,20 @@ bool GridWalk::visitNode3(const Node3& node, std::uint32_t index, BrickFacts& fa
 }
 
 // Counts a brick when it is met first; false where it cuts another.
-bool GridWalk::countBrick(std::uint32_t local, std::uint32_t bytes) {
+bool GridWalk::countBrick(std::uint32_t local, std::uint32_t encoding, std::uint32_t bytes) {
   std::vector<std::uint8_t>& units = reached_[number(Stream::unit)];
   const std::uint32_t brickClass = classOf(bytes);
-  const auto first = static_cast<std::uint8_t>(kFirstOfClass + brickClass);
-  if (units[local] == first) return true;
+  const auto first = static_cast<std::uint8_t>(kFirstUnit | brickClass << kClassShift);
+  const auto axis = static_cast<std::uint8_t>(1u << packedAxis(encoding));
   const std::span<std::uint8_t> own = std::span(units).subspan(local, bytes / kStreamItemBytes[0]);
-  const bool fresh = std::all_of(own.begin(), own.end(), [](std::uint8_t unit) { return unit == 0; });
-  if (!fresh) return false;
+  if ((own[0] & ~7u) == first) {
+    if ((own[0] & axis) == 0) ++brickCount_[brickClass];
+    own[0] = static_cast<std::uint8_t>(own[0] | axis);
+    return true;
+  }
+  if (!std::all_of(own.begin(), own.end(), [](std::uint8_t unit) { return unit == 0; })) return false;
   std::fill(own.begin(), own.end(), kInsideBrick);
-  own[0] = first;
+  own[0] = static_cast<std::uint8_t>(first | axis);
   ++brickCount_[brickClass];
   return true;
 }

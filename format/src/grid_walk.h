@@ -101,7 +101,7 @@ class GridWalk {
                    SubtreeFacts& facts);
   // False where a part of it is missing, which is reported.
   bool visitNode3(const Node3& node, std::uint32_t index, BrickFacts& facts);
-  bool countBrick(std::uint32_t local, std::uint32_t bytes);
+  bool countBrick(std::uint32_t local, std::uint32_t encoding, std::uint32_t bytes);
   void measureExactly(const Node3& node, BrickFacts& facts);
   static void boundLoosely(const Node3& node, BrickFacts& facts);
   static void measureActive(const Mask3& mask, BrickFacts& facts);

@@ -261,7 +261,7 @@ struct GridFrame {
   std::uint32_t node3Count;
   std::uint32_t maskCount;
   std::uint32_t childCount;                    // children of the Node5 and of each distinct Node4, summed
-  std::uint32_t brickCount[kBrickClassCount];  // distinct bricks by class
+  std::uint32_t brickCount[kBrickClassCount];  // distinct values of Node3.brick, by class
 };
 BILLOW_ASSERT_SIZE(GridFrame, 224);
 
