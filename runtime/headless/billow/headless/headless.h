@@ -1,0 +1,60 @@
+// The smallest host for billow: a Vulkan device without a window, and pictures read back to memory. Used by the render
+// command, the tests and the benchmark; a game has all of this already.
+#ifndef BILLOW_HEADLESS_HEADLESS_H
+#define BILLOW_HEADLESS_HEADLESS_H
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "billow/runtime/runtime.h"
+
+namespace billow::headless {
+
+using runtime::Result;
+
+struct DeviceOptions {
+  std::optional<std::uint32_t> device = {};  // as Vulkan numbers them; default: a discrete GPU if there is one
+  bool validation = false;                   // VK_LAYER_KHRONOS_validation; fails where it is not installed
+};
+
+// Two images that a picture is drawn into, and what was read back.
+struct Picture {
+  std::uint32_t width = 0, height = 0;
+  std::vector<float> rgba;   // premultiplied linear, four a pixel, top row first
+  std::vector<float> depth;  // one a pixel
+};
+
+class Headless {
+ public:
+  // Loads libvulkan at run time; its absence is an error, as is a machine without a device that fits.
+  static Result<std::unique_ptr<Headless>> create(const DeviceOptions& options);
+  virtual ~Headless() = default;
+
+  virtual const runtime::HostDevice& host() const = 0;
+  virtual const std::string& deviceName() const = 0;
+  // What the validation layer has said so far: empty is good.
+  virtual const std::vector<std::string>& validationMessages() const = 0;
+
+  // Draws one frame and waits for it. draw.color, depth and colorFormat are filled in.
+  virtual Result<Picture> render(runtime::Renderer& renderer, runtime::DrawInfo draw) = 0;
+
+  // Draws `count` times and returns each dispatch's GPU time in milliseconds.
+  virtual Result<std::vector<double>> time(runtime::Renderer& renderer, runtime::DrawInfo draw,
+                                           std::uint32_t count) = 0;
+
+  // One value per position (three floats each, pack index space) of the frame's grid in `slot`.
+  virtual Result<std::vector<float>> lookup(runtime::Renderer& renderer, const runtime::Frame& frame,
+                                            std::uint32_t slot, runtime::Filter filter,
+                                            const std::vector<float>& positions) = 0;
+
+  // Waits until the device is idle, as a host must before it destroys frames.
+  virtual void waitIdle() = 0;
+};
+
+}  // namespace billow::headless
+
+#endif  // BILLOW_HEADLESS_HEADLESS_H

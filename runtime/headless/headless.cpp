@@ -1,0 +1,302 @@
+#include "billow/headless/headless.h"
+
+#include <cstring>
+#include <utility>
+
+#include "device.h"
+
+namespace billow::headless {
+namespace {
+
+// Host-visible memory with a buffer, or device memory with an image; lives as long as one call.
+class Target {
+ public:
+  explicit Target(const VulkanDevice& device) : device_(device) {}
+  Target(const Target&) = delete;
+  Target& operator=(const Target&) = delete;
+  ~Target() {
+    const VkDevice device = device_.host.device;
+    if (view != VK_NULL_HANDLE) device_.vk.vkDestroyImageView(device, view, nullptr);
+    if (image != VK_NULL_HANDLE) device_.vk.vkDestroyImage(device, image, nullptr);
+    if (buffer != VK_NULL_HANDLE) device_.vk.vkDestroyBuffer(device, buffer, nullptr);
+    if (memory_ != VK_NULL_HANDLE) device_.vk.vkFreeMemory(device, memory_, nullptr);
+  }
+
+  Result<void> makeBuffer(VkDeviceSize size, VkBufferUsageFlags usage) {
+    auto info = begin<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
+    info.size = size;
+    info.usage = usage;
+    if (device_.vk.vkCreateBuffer(device_.host.device, &info, nullptr, &buffer) != VK_SUCCESS) {
+      return gpuError("vkCreateBuffer failed");
+    }
+    VkMemoryRequirements requirements{};
+    device_.vk.vkGetBufferMemoryRequirements(device_.host.device, buffer, &requirements);
+    const VkMemoryPropertyFlags visible = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+    if (auto done = allocate(requirements, visible); !done) return done;
+    device_.vk.vkBindBufferMemory(device_.host.device, buffer, memory_, 0);
+    void* data = nullptr;
+    if (device_.vk.vkMapMemory(device_.host.device, memory_, 0, VK_WHOLE_SIZE, 0, &data) != VK_SUCCESS) {
+      return gpuError("vkMapMemory failed");
+    }
+    mapped = static_cast<float*>(data);
+    return {};
+  }
+
+  Result<void> makeImage(VkFormat format, std::uint32_t width, std::uint32_t height) {
+    auto info = begin<VkImageCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO);
+    info.imageType = VK_IMAGE_TYPE_2D;
+    info.format = format;
+    info.extent = {width, height, 1};
+    info.mipLevels = info.arrayLayers = 1;
+    info.samples = VK_SAMPLE_COUNT_1_BIT;
+    info.usage = VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT;
+    if (device_.vk.vkCreateImage(device_.host.device, &info, nullptr, &image) != VK_SUCCESS) {
+      return gpuError("vkCreateImage failed");
+    }
+    VkMemoryRequirements requirements{};
+    device_.vk.vkGetImageMemoryRequirements(device_.host.device, image, &requirements);
+    if (auto done = allocate(requirements, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT); !done) return done;
+    device_.vk.vkBindImageMemory(device_.host.device, image, memory_, 0);
+    auto viewInfo = begin<VkImageViewCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO);
+    viewInfo.image = image;
+    viewInfo.viewType = VK_IMAGE_VIEW_TYPE_2D;
+    viewInfo.format = format;
+    viewInfo.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+    if (device_.vk.vkCreateImageView(device_.host.device, &viewInfo, nullptr, &view) != VK_SUCCESS) {
+      return gpuError("vkCreateImageView failed");
+    }
+    return {};
+  }
+
+  VkDeviceAddress address() const {
+    auto info = begin<VkBufferDeviceAddressInfo>(VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO);
+    info.buffer = buffer;
+    return device_.vk.vkGetBufferDeviceAddress(device_.host.device, &info);
+  }
+
+  VkBuffer buffer = VK_NULL_HANDLE;
+  VkImage image = VK_NULL_HANDLE;
+  VkImageView view = VK_NULL_HANDLE;
+  float* mapped = nullptr;
+
+ private:
+  Result<void> allocate(const VkMemoryRequirements& requirements, VkMemoryPropertyFlags wanted) {
+    VkPhysicalDeviceMemoryProperties types{};
+    device_.vk.vkGetPhysicalDeviceMemoryProperties(device_.host.physicalDevice, &types);
+    auto flags = begin<VkMemoryAllocateFlagsInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO);
+    flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
+    auto info = begin<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
+    info.pNext = buffer != VK_NULL_HANDLE ? &flags : nullptr;
+    info.allocationSize = requirements.size;
+    for (; info.memoryTypeIndex < types.memoryTypeCount; ++info.memoryTypeIndex) {
+      const bool allowed = (requirements.memoryTypeBits >> info.memoryTypeIndex & 1u) != 0;
+      if (allowed && (types.memoryTypes[info.memoryTypeIndex].propertyFlags & wanted) == wanted) break;
+    }
+    if (info.memoryTypeIndex == types.memoryTypeCount) return gpuError("no memory type fits");
+    if (device_.vk.vkAllocateMemory(device_.host.device, &info, nullptr, &memory_) != VK_SUCCESS) {
+      return gpuError("the GPU is out of memory");
+    }
+    return {};
+  }
+
+  const VulkanDevice& device_;
+  VkDeviceMemory memory_ = VK_NULL_HANDLE;
+};
+
+class HeadlessImpl final : public Headless {
+ public:
+  ~HeadlessImpl() override {
+    if (device_.host.device == VK_NULL_HANDLE) return;
+    device_.vk.vkDeviceWaitIdle(device_.host.device);
+    if (queries_ != VK_NULL_HANDLE) device_.vk.vkDestroyQueryPool(device_.host.device, queries_, nullptr);
+    if (fence_ != VK_NULL_HANDLE) device_.vk.vkDestroyFence(device_.host.device, fence_, nullptr);
+    if (pool_ != VK_NULL_HANDLE) device_.vk.vkDestroyCommandPool(device_.host.device, pool_, nullptr);
+  }
+
+  Result<void> open(const DeviceOptions& options) {
+    if (auto done = device_.open(options); !done) return done;
+    auto poolInfo = begin<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
+    poolInfo.queueFamilyIndex = device_.host.drawFamily;
+    auto fenceInfo = begin<VkFenceCreateInfo>(VK_STRUCTURE_TYPE_FENCE_CREATE_INFO);
+    auto queryInfo = begin<VkQueryPoolCreateInfo>(VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO);
+    queryInfo.queryType = VK_QUERY_TYPE_TIMESTAMP;
+    queryInfo.queryCount = 2;
+    const VkDevice device = device_.host.device;
+    if (device_.vk.vkCreateCommandPool(device, &poolInfo, nullptr, &pool_) != VK_SUCCESS ||
+        device_.vk.vkCreateFence(device, &fenceInfo, nullptr, &fence_) != VK_SUCCESS ||
+        device_.vk.vkCreateQueryPool(device, &queryInfo, nullptr, &queries_) != VK_SUCCESS) {
+      return gpuError("a command pool, fence or query pool cannot be made");
+    }
+    auto info = begin<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
+    info.commandPool = pool_;
+    info.commandBufferCount = 1;
+    if (device_.vk.vkAllocateCommandBuffers(device, &info, &commands_) != VK_SUCCESS) {
+      return gpuError("vkAllocateCommandBuffers failed");
+    }
+    return {};
+  }
+
+  const runtime::HostDevice& host() const override { return device_.host; }
+  const std::string& deviceName() const override { return device_.name; }
+  const std::vector<std::string>& validationMessages() const override { return device_.messages; }
+  void waitIdle() override { device_.vk.vkDeviceWaitIdle(device_.host.device); }
+
+  Result<Picture> render(runtime::Renderer& renderer, runtime::DrawInfo draw) override {
+    const std::size_t pixels = std::size_t{draw.width} * draw.height;
+    Target color(device_), depth(device_), readBack(device_);
+    if (auto done = makeImages(draw, color, depth); !done) return tl::unexpected(done.error());
+    if (auto done = readBack.makeBuffer(pixels * 20, VK_BUFFER_USAGE_TRANSFER_DST_BIT); !done) {
+      return tl::unexpected(done.error());
+    }
+    beginCommands();
+    toGeneral(color.image, depth.image);
+    if (auto done = renderer.record(commands_, draw); !done) return tl::unexpected(done.error());
+    barrier(VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT, VK_ACCESS_2_SHADER_WRITE_BIT, VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT,
+            VK_ACCESS_2_TRANSFER_READ_BIT);
+    copyImage(color.image, draw, readBack.buffer, 0);
+    copyImage(depth.image, draw, readBack.buffer, pixels * 16);
+    barrier(VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_2_HOST_BIT,
+            VK_ACCESS_2_HOST_READ_BIT);
+    if (auto done = submitAndWait(renderer, *draw.frame); !done) return tl::unexpected(done.error());
+    Picture picture{.width = draw.width, .height = draw.height, .rgba = {}, .depth = {}};
+    picture.rgba.assign(readBack.mapped, readBack.mapped + pixels * 4);
+    picture.depth.assign(readBack.mapped + pixels * 4, readBack.mapped + pixels * 5);
+    return picture;
+  }
+
+  Result<std::vector<double>> time(runtime::Renderer& renderer, runtime::DrawInfo draw, std::uint32_t count) override {
+    Target color(device_), depth(device_);
+    if (auto done = makeImages(draw, color, depth); !done) return tl::unexpected(done.error());
+    std::vector<double> milliseconds;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      beginCommands();
+      toGeneral(color.image, depth.image);
+      device_.vk.vkCmdResetQueryPool(commands_, queries_, 0, 2);
+      device_.vk.vkCmdWriteTimestamp2(commands_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, queries_, 0);
+      if (auto done = renderer.record(commands_, draw); !done) return tl::unexpected(done.error());
+      device_.vk.vkCmdWriteTimestamp2(commands_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, queries_, 1);
+      if (auto done = submitAndWait(renderer, *draw.frame); !done) return tl::unexpected(done.error());
+      std::uint64_t ticks[2] = {};
+      device_.vk.vkGetQueryPoolResults(device_.host.device, queries_, 0, 2, sizeof(ticks), ticks, sizeof(ticks[0]),
+                                       VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT);
+      milliseconds.push_back(static_cast<double>(ticks[1] - ticks[0]) * double{device_.timestampPeriod} * 1e-6);
+    }
+    return milliseconds;
+  }
+
+  Result<std::vector<float>> lookup(runtime::Renderer& renderer, const runtime::Frame& frame, std::uint32_t slot,
+                                    runtime::Filter filter, const std::vector<float>& positions) override {
+    const std::size_t count = positions.size() / 3;
+    const VkBufferUsageFlags usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
+    Target in(device_), out(device_);
+    if (auto done = in.makeBuffer(positions.size() * 4, usage); !done) return tl::unexpected(done.error());
+    if (auto done = out.makeBuffer(count * 4, usage); !done) return tl::unexpected(done.error());
+    std::memcpy(in.mapped, positions.data(), positions.size() * 4);
+    beginCommands();
+    const runtime::LookupInfo info{.frame = &frame,
+                                   .slot = slot,
+                                   .filter = filter,
+                                   .positions = in.address(),
+                                   .values = out.address(),
+                                   .count = static_cast<std::uint32_t>(count)};
+    if (auto done = renderer.recordLookup(commands_, info); !done) return tl::unexpected(done.error());
+    barrier(VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT, VK_ACCESS_2_SHADER_WRITE_BIT, VK_PIPELINE_STAGE_2_HOST_BIT,
+            VK_ACCESS_2_HOST_READ_BIT);
+    if (auto done = submitAndWait(renderer, frame); !done) return tl::unexpected(done.error());
+    return std::vector<float>(out.mapped, out.mapped + count);
+  }
+
+ private:
+  Result<void> makeImages(runtime::DrawInfo& draw, Target& color, Target& depth) {
+    if (auto done = color.makeImage(VK_FORMAT_R32G32B32A32_SFLOAT, draw.width, draw.height); !done) return done;
+    if (auto done = depth.makeImage(VK_FORMAT_R32_SFLOAT, draw.width, draw.height); !done) return done;
+    draw.colorFormat = runtime::ColorFormat::single;
+    draw.color = color.view;
+    draw.depth = depth.view;
+    return {};
+  }
+
+  void beginCommands() {
+    device_.vk.vkResetCommandPool(device_.host.device, pool_, 0);
+    auto info = begin<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
+    info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+    device_.vk.vkBeginCommandBuffer(commands_, &info);
+  }
+
+  void toGeneral(VkImage color, VkImage depth) {
+    VkImageMemoryBarrier2 barriers[2];
+    for (int i = 0; i < 2; ++i) {
+      barriers[i] = begin<VkImageMemoryBarrier2>(VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2);
+      // The write stage orders this draw after the one before it, which wrote the same images.
+      barriers[i].srcStageMask = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
+      barriers[i].dstStageMask = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
+      barriers[i].dstAccessMask = VK_ACCESS_2_SHADER_WRITE_BIT;
+      barriers[i].newLayout = VK_IMAGE_LAYOUT_GENERAL;
+      barriers[i].srcQueueFamilyIndex = barriers[i].dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+      barriers[i].image = i == 0 ? color : depth;
+      barriers[i].subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+    }
+    auto info = begin<VkDependencyInfo>(VK_STRUCTURE_TYPE_DEPENDENCY_INFO);
+    info.imageMemoryBarrierCount = 2;
+    info.pImageMemoryBarriers = barriers;
+    device_.vk.vkCmdPipelineBarrier2(commands_, &info);
+  }
+
+  void barrier(VkPipelineStageFlags2 fromStage, VkAccessFlags2 fromAccess, VkPipelineStageFlags2 toStage,
+               VkAccessFlags2 toAccess) {
+    auto memory = begin<VkMemoryBarrier2>(VK_STRUCTURE_TYPE_MEMORY_BARRIER_2);
+    memory.srcStageMask = fromStage;
+    memory.srcAccessMask = fromAccess;
+    memory.dstStageMask = toStage;
+    memory.dstAccessMask = toAccess;
+    auto info = begin<VkDependencyInfo>(VK_STRUCTURE_TYPE_DEPENDENCY_INFO);
+    info.memoryBarrierCount = 1;
+    info.pMemoryBarriers = &memory;
+    device_.vk.vkCmdPipelineBarrier2(commands_, &info);
+  }
+
+  void copyImage(VkImage image, const runtime::DrawInfo& draw, VkBuffer to, VkDeviceSize offset) {
+    VkBufferImageCopy copy{};
+    copy.bufferOffset = offset;
+    copy.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
+    copy.imageExtent = {draw.width, draw.height, 1};
+    device_.vk.vkCmdCopyImageToBuffer(commands_, image, VK_IMAGE_LAYOUT_GENERAL, to, 1, &copy);
+  }
+
+  Result<void> submitAndWait(const runtime::Renderer& renderer, const runtime::Frame& frame) {
+    device_.vk.vkEndCommandBuffer(commands_);
+    auto commandInfo = begin<VkCommandBufferSubmitInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO);
+    commandInfo.commandBuffer = commands_;
+    auto wait = begin<VkSemaphoreSubmitInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO);
+    wait.semaphore = renderer.uploadSemaphore();
+    wait.value = frame.uploadValue();
+    wait.stageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT;
+    auto info = begin<VkSubmitInfo2>(VK_STRUCTURE_TYPE_SUBMIT_INFO_2);
+    info.waitSemaphoreInfoCount = 1;
+    info.pWaitSemaphoreInfos = &wait;
+    info.commandBufferInfoCount = 1;
+    info.pCommandBufferInfos = &commandInfo;
+    const VkDevice device = device_.host.device;
+    VkResult result = device_.vk.vkQueueSubmit2(device_.host.uploadQueue, 1, &info, fence_);
+    if (result == VK_SUCCESS) result = device_.vk.vkWaitForFences(device, 1, &fence_, VK_TRUE, UINT64_MAX);
+    device_.vk.vkResetFences(device, 1, &fence_);
+    if (result != VK_SUCCESS) return gpuError("the GPU failed with VkResult " + std::to_string(result));
+    return {};
+  }
+
+  VulkanDevice device_;
+  VkCommandPool pool_ = VK_NULL_HANDLE;
+  VkCommandBuffer commands_ = VK_NULL_HANDLE;
+  VkFence fence_ = VK_NULL_HANDLE;
+  VkQueryPool queries_ = VK_NULL_HANDLE;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Headless>> Headless::create(const DeviceOptions& options) {
+  auto headless = std::make_unique<HeadlessImpl>();
+  if (auto done = headless->open(options); !done) return tl::unexpected(done.error());
+  return std::unique_ptr<Headless>(std::move(headless));
+}
+
+}  // namespace billow::headless

@@ -1,0 +1,209 @@
+// The runtime that a game links: it uploads frames of a pack and records passes that draw them.
+//
+//   auto renderer = billow::runtime::Renderer::create(host, {.gpuBudget = 256u << 20});
+//   auto frame = (*renderer)->upload(pack, volume, frameIndex, {});
+//   // wait on (*renderer)->uploadSemaphore() for (*frame)->uploadValue() in the submission that draws, then
+//   (*renderer)->record(commandBuffer, {.frame = frame->get(), .view = view, ...});
+//
+// The host owns instance, device, queues, images, command buffers and the frame loop. billow enables nothing and waits
+// for nothing; it submits uploads to the queue that the host lends, and only inside of upload(). No exception leaves
+// it. A Renderer and its frames are used from one thread at a time.
+#ifndef BILLOW_RUNTIME_RUNTIME_H
+#define BILLOW_RUNTIME_RUNTIME_H
+
+#include <vulkan/vulkan_core.h>
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <tl/expected.hpp>
+
+#include "billow/format/gpu_size.h"
+#include "billow/format/pack.h"
+
+namespace billow::runtime {
+
+enum class ErrorCode {
+  pack,         // the pack breaks a rule or cannot be read
+  budget,       // the frame does not fit into the budget; nothing was allocated
+  unsupported,  // the device lacks something that billow needs
+  vulkan,       // a Vulkan call failed
+  argument,     // an argument is outside of what its comment allows
+};
+
+struct Error {
+  ErrorCode code;
+  std::string message;  // one line
+  std::optional<format::Issue> issue = {};  // where code is pack
+};
+
+template <class T>
+using Result = tl::expected<T, Error>;
+
+// What the host lends. It must outlive the Renderer. The device needs Vulkan 1.3 with the features
+// bufferDeviceAddress, timelineSemaphore and synchronization2 enabled.
+struct HostDevice {
+  VkInstance instance = VK_NULL_HANDLE;
+  VkPhysicalDevice physicalDevice = VK_NULL_HANDLE;
+  VkDevice device = VK_NULL_HANDLE;
+  PFN_vkGetInstanceProcAddr getInstanceProcAddr = nullptr;
+  VkQueue uploadQueue = VK_NULL_HANDLE;  // transfer, graphics or compute; the host guards it during upload()
+  std::uint32_t uploadFamily = 0;
+  std::uint32_t drawFamily = 0;           // of the queues that run recorded commands
+  bool textureCompressionBc = false;      // you checked and enabled it
+};
+
+struct Config {
+  std::uint64_t gpuBudget = std::uint64_t{1} << 30;  // bytes of all memory that billow allocates, staging included
+  std::uint32_t recordsInFlight = 3;  // record() and recordLookup() calls whose commands may be pending at once
+  bool decodeBlocks = false;          // keep BC7 and BC4 bricks as R8, as on devices without BC 3D images
+};
+
+enum class Index : std::uint32_t { flat = 0, tree = 1, dense = 2, automatic = 3 };
+enum class Filter : std::uint32_t { nearest = 0, trilinear = 1, none = 2 };  // none: shadows only
+enum class ColorFormat { half, single };                                     // RGBA16F, RGBA32F
+
+// The three grids that a picture needs. kNone where the volume has none.
+struct GridChoice {
+  std::uint32_t extinction = format::kNone;  // numbers within the volume
+  std::uint32_t temperature = format::kNone;
+  std::uint32_t flames = format::kNone;
+};
+
+// By role; where no grid has a role, the first grid is extinction.
+GridChoice chooseGrids(const format::Pack& pack, const format::VolumeRecord& volume);
+
+struct UploadOptions {
+  std::optional<GridChoice> grids = {};  // default: chooseGrids()
+  Index index = Index::automatic;        // automatic: what format::gpuBytes chooses; dense is for measurements
+};
+
+// Device bytes of a frame.
+struct FrameStats {
+  std::uint64_t indexBytes = 0;
+  std::uint64_t recordBytes = 0;
+  std::uint64_t maskBytes = 0;
+  std::uint64_t brickBytes = 0;      // payload of the atlases' used slots
+  std::uint64_t allocatedBytes = 0;  // what Vulkan was asked for, alignment and unused slots included
+  std::uint32_t bricks[3] = {};      // distinct, in the BC7, BC4 and R8 atlas (R16 counts two slots of R8)
+  std::uint64_t payload() const { return indexBytes + recordBytes + maskBytes + brickBytes; }
+};
+
+// One frame of one volume, resident. Destroy it when no pending commands use it, before its Renderer.
+class Frame {
+ public:
+  virtual ~Frame() = default;
+  virtual const FrameStats& stats() const = 0;
+  // uploadSemaphore() reaches this value when the upload is complete.
+  virtual std::uint64_t uploadValue() const = 0;
+  // Whether any grid has an active voxel.
+  virtual bool empty() const = 0;
+};
+
+// A pinhole camera in world space. `right`, `up` and `forward` are orthonormal.
+struct View {
+  std::array<double, 3> eye{0, 0, 0};
+  std::array<float, 3> right{1, 0, 0};
+  std::array<float, 3> up{0, 1, 0};
+  std::array<float, 3> forward{0, 0, -1};
+  float tanHalfHeight = 0.4f;  // tangent of half the vertical field of view, > 0
+};
+
+// Looks from `eye` at `target`; fieldOfView in degrees, vertical, in (0, 180). `upward` must not be parallel to the
+// direction of view; if it is, another axis is taken.
+View lookAt(const std::array<double, 3>& eye, const std::array<double, 3>& target, const std::array<double, 3>& upward,
+            float fieldOfView);
+
+struct Sun {
+  std::array<float, 3> direction{0, 0, 1};   // to the sun, world space, any length but 0
+  std::array<float, 3> irradiance{8, 8, 8};  // at normal incidence, linear RGB, >= 0
+};
+
+// How grid values become light. Fields as format::LookRecord has them.
+struct Look {
+  float extinctionScale = 1;
+  std::array<float, 3> albedo{0.9f, 0.9f, 0.9f};
+  float anisotropy = 0.5f;          // in (-1, 1)
+  float emissionScale = 1;          // 0: no emission
+  float temperatureScale = 1000;    // kelvin a grid value
+  float temperatureOffset = 300;    // kelvin
+  float referenceKelvin = 1600;     // black body of radiance emissionScale, > 0
+  std::array<float, 3> ambient{0.3f, 0.35f, 0.4f};
+  std::uint32_t scatteringOrders = 1;  // 1: single scattering; more imitate multiple scattering; 1 to 8
+  // Smoke derived from temperature (or flames) where there is no extinction grid: shares of heatMax at which smoke
+  // begins and is full, and what is left of it at heatMax.
+  float heatMax = 1;  // largest temperature (or flames) value, > 0
+  float smokeBegin = 0.02f;
+  float smokeFull = 0.3f;
+  float smokeInFire = 0.25f;
+};
+
+struct Quality {
+  Filter filter = Filter::trilinear;
+  Filter shadows = Filter::trilinear;
+  float step = 1;                  // voxels, > 0; never less than a pixel's width
+  float shadowStep = 2;            // voxels, > 0
+  std::uint32_t shadowSteps = 64;  // at most, a sample; longer ways take longer steps
+  bool jitter = false;             // displace each pixel's steps by a fixed pattern: noise in place of bands
+};
+
+struct Background {
+  std::array<float, 3> bottom{0, 0, 0};  // linear radiance
+  std::array<float, 3> top{0, 0, 0};
+  float opacity = 0;  // 0: premultiplied result, its alpha is the volume's; 1: the background fills it
+};
+
+struct DrawInfo {
+  const Frame* frame = nullptr;
+  View view;
+  Sun sun;
+  Look look;
+  Quality quality;
+  Background background;
+  std::uint32_t width = 0, height = 0;  // of both images
+  ColorFormat colorFormat = ColorFormat::half;
+  VkImageView color = VK_NULL_HANDLE;  // storage image, premultiplied linear RGBA
+  VkImageView depth = VK_NULL_HANDLE;  // storage image R32F: distance along `forward`, opacity-weighted; infinity
+                                       // where nothing is
+};
+
+// Reads of single values, as the march makes them: a tool for tests.
+struct LookupInfo {
+  const Frame* frame = nullptr;
+  std::uint32_t slot = 0;               // 0 extinction, 1 temperature, 2 flames
+  Filter filter = Filter::nearest;
+  VkDeviceAddress positions = 0;        // count times three floats, pack index space
+  VkDeviceAddress values = 0;           // count floats are written
+  std::uint32_t count = 0;
+};
+
+class Renderer {
+ public:
+  static Result<std::unique_ptr<Renderer>> create(const HostDevice& host, const Config& config);
+  // No commands that were recorded may be pending, and every upload must be complete.
+  virtual ~Renderer() = default;
+
+  // Reads, checks and decompresses what frame number `frame` (an index into the volume's frames) needs, and submits one
+  // transfer. The pack is not trusted and is not kept.
+  virtual Result<std::unique_ptr<Frame>> upload(const format::Pack& pack, std::uint32_t volume, std::uint32_t frame,
+                                                const UploadOptions& options) = 0;
+  virtual VkSemaphore uploadSemaphore() const = 0;
+
+  // Records one dispatch that writes every pixel of both images. A pipeline is built when a combination of grids,
+  // index, filter and colour format is met for the first time.
+  // barriers: both images must be in VK_IMAGE_LAYOUT_GENERAL and free of pending access; afterwards they were written
+  // by the compute shader stage. The submission must wait for the frame's uploadValue().
+  virtual Result<void> record(VkCommandBuffer commands, const DrawInfo& draw) = 0;
+
+  // barriers: as record(), for the two buffers.
+  virtual Result<void> recordLookup(VkCommandBuffer commands, const LookupInfo& lookup) = 0;
+
+  // All memory that billow holds now, in bytes. Staging memory is given back at the next upload() after its completion.
+  virtual std::uint64_t bytesInUse() const = 0;
+};
+
+}  // namespace billow::runtime
+
+#endif  // BILLOW_RUNTIME_RUNTIME_H

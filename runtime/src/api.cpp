@@ -1,0 +1,30 @@
+#include "api.h"
+
+#include <utility>
+
+namespace billow::runtime {
+
+tl::unexpected<Error> failure(ErrorCode code, std::string message) {
+  return tl::unexpected(Error{.code = code, .message = std::move(message)});
+}
+
+tl::unexpected<Error> vulkanError(const char* call, VkResult result) {
+  return failure(ErrorCode::vulkan, std::string(call) + " failed with VkResult " + std::to_string(result));
+}
+
+Result<Api> loadApi(const HostDevice& host) {
+  Api api;
+#define BILLOW_LOAD(name)                                                                               \
+  api.name = reinterpret_cast<PFN_##name>(host.getInstanceProcAddr(host.instance, #name));              \
+  if (api.name == nullptr) return failure(ErrorCode::unsupported, "the Vulkan instance lacks " #name);
+  BILLOW_INSTANCE_FUNCTIONS(BILLOW_LOAD)
+#undef BILLOW_LOAD
+#define BILLOW_LOAD(name)                                                                               \
+  api.name = reinterpret_cast<PFN_##name>(api.vkGetDeviceProcAddr(host.device, #name));                 \
+  if (api.name == nullptr) return failure(ErrorCode::unsupported, "the Vulkan device lacks " #name);
+  BILLOW_DEVICE_FUNCTIONS(BILLOW_LOAD)
+#undef BILLOW_LOAD
+  return api;
+}
+
+}  // namespace billow::runtime

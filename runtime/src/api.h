@@ -1,0 +1,99 @@
+// Vulkan through the host's loader: no symbol of it is linked.
+#ifndef BILLOW_RUNTIME_API_H
+#define BILLOW_RUNTIME_API_H
+
+#include <vulkan/vulkan_core.h>
+
+#include <string>
+
+#include "billow/runtime/runtime.h"
+
+namespace billow::runtime {
+
+#define BILLOW_INSTANCE_FUNCTIONS(X)   \
+  X(vkGetDeviceProcAddr)               \
+  X(vkGetPhysicalDeviceProperties2)    \
+  X(vkGetPhysicalDeviceMemoryProperties) \
+  X(vkGetPhysicalDeviceFormatProperties) \
+  X(vkGetPhysicalDeviceImageFormatProperties)
+
+#define BILLOW_DEVICE_FUNCTIONS(X)  \
+  X(vkAllocateCommandBuffers)       \
+  X(vkAllocateDescriptorSets)       \
+  X(vkAllocateMemory)               \
+  X(vkBeginCommandBuffer)           \
+  X(vkBindBufferMemory)             \
+  X(vkBindImageMemory)              \
+  X(vkCmdBindDescriptorSets)        \
+  X(vkCmdBindPipeline)              \
+  X(vkCmdCopyBuffer)                \
+  X(vkCmdCopyBufferToImage)         \
+  X(vkCmdDispatch)                  \
+  X(vkCmdPipelineBarrier2)          \
+  X(vkCmdPushConstants)             \
+  X(vkCreateBuffer)                 \
+  X(vkCreateCommandPool)            \
+  X(vkCreateComputePipelines)       \
+  X(vkCreateDescriptorPool)         \
+  X(vkCreateDescriptorSetLayout)    \
+  X(vkCreateImage)                  \
+  X(vkCreateImageView)              \
+  X(vkCreatePipelineLayout)         \
+  X(vkCreateSemaphore)              \
+  X(vkCreateShaderModule)           \
+  X(vkDestroyBuffer)                \
+  X(vkDestroyCommandPool)           \
+  X(vkDestroyDescriptorPool)        \
+  X(vkDestroyDescriptorSetLayout)   \
+  X(vkDestroyImage)                 \
+  X(vkDestroyImageView)             \
+  X(vkDestroyPipeline)              \
+  X(vkDestroyPipelineLayout)        \
+  X(vkDestroySemaphore)             \
+  X(vkDestroyShaderModule)          \
+  X(vkEndCommandBuffer)             \
+  X(vkFreeCommandBuffers)           \
+  X(vkFreeMemory)                   \
+  X(vkGetBufferDeviceAddress)       \
+  X(vkGetBufferMemoryRequirements)  \
+  X(vkGetImageMemoryRequirements)   \
+  X(vkGetSemaphoreCounterValue)     \
+  X(vkMapMemory)                    \
+  X(vkQueueSubmit2)                 \
+  X(vkUpdateDescriptorSets)
+
+struct Api {
+#define BILLOW_DECLARE(name) PFN_##name name = nullptr;
+  BILLOW_INSTANCE_FUNCTIONS(BILLOW_DECLARE)
+  BILLOW_DEVICE_FUNCTIONS(BILLOW_DECLARE)
+#undef BILLOW_DECLARE
+};
+
+// Fails with the first function that is missing.
+Result<Api> loadApi(const HostDevice& host);
+
+// A Vulkan structure with its type set and all else zero.
+template <class Info>
+Info begin(VkStructureType type) {
+  Info info{};
+  info.sType = type;
+  return info;
+}
+
+// What every object of the runtime needs.
+struct Device {
+  HostDevice host;
+  Api api;
+  VkPhysicalDeviceMemoryProperties memory{};
+  std::uint32_t maxImageExtent3D = 0;
+  std::uint64_t budget = 0;
+  std::uint64_t used = 0;
+  bool blockImages = false;  // BC7 and BC4 as sampled 3D images
+};
+
+tl::unexpected<Error> vulkanError(const char* call, VkResult result);
+tl::unexpected<Error> failure(ErrorCode code, std::string message);
+
+}  // namespace billow::runtime
+
+#endif  // BILLOW_RUNTIME_API_H

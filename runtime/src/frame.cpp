@@ -1,0 +1,191 @@
+#include "frame.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+namespace billow::runtime {
+namespace {
+
+constexpr std::uint64_t kSectionAlign = 16;
+
+std::uint64_t aligned(std::uint64_t bytes) { return (bytes + kSectionAlign - 1) / kSectionAlign * kSectionAlign; }
+
+template <class T>
+std::span<const std::byte> bytesOf(const std::vector<T>& items) {
+  return std::as_bytes(std::span(items));
+}
+
+// A grid's arrays in the order in which they lie in the buffer.
+std::array<std::span<const std::byte>, 5> sectionsOf(const GpuGrid& grid) {
+  return {bytesOf(grid.table), bytesOf(grid.records), bytesOf(grid.masks), bytesOf(grid.node4), bytesOf(grid.children)};
+}
+
+Result<void> stageGrid(StagedFrame& staged, std::uint32_t slot, const format::Pack& pack,
+                       const format::GridFrame& gridFrame, Index index) {
+  if ((gridFrame.flags & format::kGridPresent) == 0 || gridFrame.node5 == format::kNone) return {};
+  auto view = format::GridView::load(pack, gridFrame);
+  if (!view) {
+    return tl::unexpected(Error{.code = ErrorCode::pack, .message = toString(view.error()), .issue = view.error()});
+  }
+  staged.views.push_back(std::move(*view));
+  staged.grids[slot] = buildGpuGrid(staged.views.back(), index, staged.slots);
+  for (const auto section : sectionsOf(*staged.grids[slot])) staged.bufferBytes += aligned(section.size());
+  return {};
+}
+
+Result<void> shapeAtlases(StagedFrame& staged, std::uint32_t maxExtent) {
+  for (std::uint32_t i = 0; i < kAtlasCount; ++i) {
+    const AtlasClass which = static_cast<AtlasClass>(i);
+    if (staged.slots.slots(which) == 0) continue;
+    staged.shapes[i] = atlasShape(which, staged.slots.slots(which), maxExtent);
+    if (!staged.shapes[i]) {
+      return failure(ErrorCode::unsupported, "the frame has more bricks than the device's largest 3D image holds");
+    }
+  }
+  // Descriptors must be valid, so a frame of constants alone still has one atlas.
+  if (!staged.shapes[0] && !staged.shapes[1] && !staged.shapes[2]) {
+    staged.shapes[2] = AtlasShape{.which = AtlasClass::r8, .xBits = 0, .yBits = 0, .layers = 1};
+  }
+  return {};
+}
+
+void countBytes(const StagedFrame& staged, FrameStats& stats) {
+  static constexpr std::uint64_t kSlotBytes[kAtlasCount] = {128, 256, 512};
+  for (const auto& grid : staged.grids) {
+    if (!grid) continue;
+    stats.indexBytes += grid->indexBytes();
+    stats.recordBytes += grid->records.size() * sizeof(format::Node3);
+    stats.maskBytes += grid->masks.size() * sizeof(format::Mask3);
+  }
+  for (std::uint32_t i = 0; i < kAtlasCount; ++i) {
+    stats.bricks[i] = staged.slots.slots(static_cast<AtlasClass>(i));
+    stats.brickBytes += stats.bricks[i] * kSlotBytes[i];
+  }
+}
+
+ResidentGrid describe(const GpuGrid& grid, VkDeviceAddress& at) {
+  ResidentGrid resident{.present = true,
+                        .frame = grid.frame,
+                        .cells = grid.cells,
+                        .index = grid.index,
+                        .absent5 = grid.absent5,
+                        .skippable = grid.skippable};
+  VkDeviceAddress* const addresses[] = {&resident.table, &resident.records, &resident.masks, &resident.node4,
+                                        &resident.children};
+  std::size_t next = 0;
+  for (const auto section : sectionsOf(grid)) {
+    *addresses[next++] = at;
+    at += aligned(section.size());
+  }
+  return resident;
+}
+
+void fillStaging(const StagedFrame& staged, const FrameObjects& objects) {
+  const std::span<std::byte> bytes = objects.staging.mapped();
+  std::fill(bytes.begin(), bytes.end(), std::byte{0});
+  std::uint64_t at = 0;
+  for (const auto& grid : staged.grids) {
+    if (!grid) continue;
+    for (const auto section : sectionsOf(*grid)) {
+      if (!section.empty()) std::memcpy(bytes.subspan(at, section.size()).data(), section.data(), section.size());
+      at += aligned(section.size());
+    }
+  }
+  for (std::uint32_t i = 0; i < kAtlasCount; ++i) {
+    if (!staged.shapes[i]) continue;
+    const std::span<std::byte> image = bytes.subspan(objects.offsets[i], staged.shapes[i]->bytes());
+    for (const AtlasBrick& brick : staged.slots.bricks(static_cast<AtlasClass>(i))) {
+      writeSlot(*staged.shapes[i], brick, image);
+    }
+  }
+}
+
+Result<void> createObjects(Device& device, const StagedFrame& staged, FrameObjects& objects) {
+  ResidentFrame& frame = *objects.frame;
+  const std::uint64_t bufferBytes = std::max<std::uint64_t>(staged.bufferBytes, kSectionAlign);
+  auto buffer = Buffer::make(device, bufferBytes,
+                             VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
+                                 VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT);
+  if (!buffer) return tl::unexpected(buffer.error());
+  frame.buffer_ = std::move(*buffer);
+  frame.bufferBytes_ = staged.bufferBytes;
+  frame.stats_.allocatedBytes = frame.buffer_.allocationSize();
+  std::uint64_t stagingBytes = aligned(bufferBytes);
+  for (std::uint32_t i = 0; i < kAtlasCount; ++i) {
+    if (!staged.shapes[i]) continue;
+    frame.shapes_[i] = *staged.shapes[i];
+    objects.offsets[i] = stagingBytes;
+    stagingBytes += aligned(staged.shapes[i]->bytes());
+    auto image = Image3D::make(device, staged.shapes[i]->format(), staged.shapes[i]->extent());
+    if (!image) return tl::unexpected(image.error());
+    frame.atlases_[i] = std::move(*image);
+    frame.stats_.allocatedBytes += frame.atlases_[i].allocationSize();
+  }
+  auto staging = Buffer::make(device, stagingBytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
+  if (!staging) return tl::unexpected(staging.error());
+  objects.staging = std::move(*staging);
+  return {};
+}
+
+Result<void> checkBudget(const Device& device, const FrameObjects& objects) {
+  const std::uint64_t needed = objects.frame->stats_.allocatedBytes + objects.staging.allocationSize();
+  if (needed <= device.budget - device.used) return {};
+  return failure(ErrorCode::budget, "the frame needs " + std::to_string(objects.frame->stats_.allocatedBytes) +
+                                        " bytes on the GPU and " + std::to_string(objects.staging.allocationSize()) +
+                                        " of staging, but only " + std::to_string(device.budget - device.used) +
+                                        " of the budget of " + std::to_string(device.budget) + " are free");
+}
+
+Result<void> bindObjects(FrameObjects& objects) {
+  if (auto bound = objects.frame->buffer_.bind(Placement::device); !bound) return bound;
+  for (Image3D& atlas : objects.frame->atlases_) {
+    if (atlas.handle() == VK_NULL_HANDLE) continue;
+    if (auto bound = atlas.bind(); !bound) return bound;
+  }
+  return objects.staging.bind(Placement::mapped);
+}
+
+}  // namespace
+
+bool ResidentFrame::empty() const {
+  return std::none_of(grids_.begin(), grids_.end(), [](const ResidentGrid& grid) { return grid.present; });
+}
+
+Result<StagedFrame> stageFrame(const Device& device, const format::Pack& pack, std::uint32_t volume,
+                               std::uint32_t frame, const UploadOptions& options, bool decodeBlocks) {
+  if (volume >= pack.volumes().size()) return failure(ErrorCode::argument, "the pack has no such volume");
+  const format::VolumeRecord& record = pack.volumes()[volume];
+  if (frame >= record.frameCount) return failure(ErrorCode::argument, "the volume has no such frame");
+  const GridChoice choice = options.grids.value_or(chooseGrids(pack, record));
+  const std::uint32_t numbers[gpu::kGridSlots] = {choice.extinction, choice.temperature, choice.flames};
+  StagedFrame staged{.views = {}, .grids = {}, .shapes = {}, .slots = BrickSlots(decodeBlocks), .bufferBytes = 0};
+  // Views must not move while bricks and masks are read from them.
+  staged.views.reserve(gpu::kGridSlots);
+  for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
+    if (numbers[slot] == format::kNone) continue;
+    if (numbers[slot] >= record.gridCount) return failure(ErrorCode::argument, "the volume has no such grid");
+    const auto done = stageGrid(staged, slot, pack, pack.gridFrame(record, frame, numbers[slot]), options.index);
+    if (!done) return tl::unexpected(done.error());
+  }
+  const auto shaped = shapeAtlases(staged, device.maxImageExtent3D);
+  if (!shaped) return tl::unexpected(shaped.error());
+  return staged;
+}
+
+Result<FrameObjects> makeFrameObjects(Device& device, const StagedFrame& staged) {
+  FrameObjects objects;
+  objects.frame = std::make_unique<ResidentFrame>();
+  countBytes(staged, objects.frame->stats_);
+  if (auto made = createObjects(device, staged, objects); !made) return tl::unexpected(made.error());
+  if (auto fits = checkBudget(device, objects); !fits) return tl::unexpected(fits.error());
+  if (auto bound = bindObjects(objects); !bound) return tl::unexpected(bound.error());
+  VkDeviceAddress at = objects.frame->buffer_.address();
+  for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
+    if (staged.grids[slot]) objects.frame->grids_[slot] = describe(*staged.grids[slot], at);
+  }
+  fillStaging(staged, objects);
+  return objects;
+}
+
+}  // namespace billow::runtime

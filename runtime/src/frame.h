@@ -1,0 +1,66 @@
+// A resident frame and how it gets there.
+#ifndef BILLOW_RUNTIME_FRAME_H
+#define BILLOW_RUNTIME_FRAME_H
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "atlas.h"
+#include "gpu_grid.h"
+#include "interface.h"
+#include "memory.h"
+
+namespace billow::runtime {
+
+// One grid's part of a resident frame, ready to be written into GridParams.
+struct ResidentGrid {
+  bool present = false;
+  format::GridFrame frame{};
+  format::CellBox cells{};
+  Index index = Index::flat;
+  std::uint32_t absent5 = 0;
+  bool skippable = true;
+  VkDeviceAddress table = 0, records = 0, masks = 0, node4 = 0, children = 0;
+};
+
+class ResidentFrame final : public Frame {
+ public:
+  const FrameStats& stats() const override { return stats_; }
+  std::uint64_t uploadValue() const override { return uploadValue_; }
+  bool empty() const override;
+
+  FrameStats stats_;
+  std::uint64_t uploadValue_ = 0;
+  std::array<ResidentGrid, gpu::kGridSlots> grids_;
+  Buffer buffer_;  // tables, records, masks of all grids
+  std::uint64_t bufferBytes_ = 0;  // of it that are copied from staging
+  std::array<Image3D, kAtlasCount> atlases_;
+  std::array<AtlasShape, kAtlasCount> shapes_;
+};
+
+// A frame on the CPU: what will be copied, with the views that its bricks point into.
+struct StagedFrame {
+  std::vector<format::GridView> views;
+  std::array<std::optional<GpuGrid>, gpu::kGridSlots> grids;
+  std::array<std::optional<AtlasShape>, kAtlasCount> shapes;
+  BrickSlots slots;
+  std::uint64_t bufferBytes = 0;
+};
+
+// Loads and checks the grids, builds indices and gives out slots. Allocates nothing on the device.
+Result<StagedFrame> stageFrame(const Device& device, const format::Pack& pack, std::uint32_t volume,
+                               std::uint32_t frame, const UploadOptions& options, bool decodeBlocks);
+
+// Creates the frame's objects and its staging buffer, checks them against the budget, then allocates and fills the
+// staging memory. `offsets` receives where each atlas begins in it; the buffer's bytes are at 0.
+struct FrameObjects {
+  std::unique_ptr<ResidentFrame> frame;
+  Buffer staging;
+  std::array<std::uint64_t, kAtlasCount> offsets{};
+};
+Result<FrameObjects> makeFrameObjects(Device& device, const StagedFrame& staged);
+
+}  // namespace billow::runtime
+
+#endif  // BILLOW_RUNTIME_FRAME_H

@@ -1,0 +1,64 @@
+// From a checked grid to what the GPU walks: an index over cells of 8^3 voxels, records, masks, and distinct bricks.
+#ifndef BILLOW_RUNTIME_GPU_GRID_H
+#define BILLOW_RUNTIME_GPU_GRID_H
+
+#include <cstdint>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "billow/format/gpu_size.h"
+#include "billow/format/grid_view.h"
+#include "billow/runtime/runtime.h"
+
+namespace billow::runtime {
+
+enum class AtlasClass : std::uint32_t { bc7 = 0, bc4 = 1, r8 = 2 };
+inline constexpr std::uint32_t kAtlasCount = 3;
+
+AtlasClass atlasClassOf(std::uint32_t encoding);
+
+struct AtlasBrick {
+  std::span<const std::byte> bytes;  // in the pack's encoding; lives as long as its GridView
+  std::uint32_t encoding;
+  std::uint32_t slot;
+};
+
+// Gives bricks slots; what is equal in the pack (same unit) gets one slot, whichever grid asks.
+class BrickSlots {
+ public:
+  explicit BrickSlots(bool decodeBlocks) : decodeBlocks_(decodeBlocks) {}
+
+  // The record's brick word: encoding on the GPU << kEncodingShift | slot.
+  std::uint32_t place(const format::GridView::Leaf& leaf);
+
+  std::span<const AtlasBrick> bricks(AtlasClass which) const { return bricks_[static_cast<std::uint32_t>(which)]; }
+  std::uint32_t slots(AtlasClass which) const { return slots_[static_cast<std::uint32_t>(which)]; }
+
+ private:
+  bool decodeBlocks_;
+  std::vector<AtlasBrick> bricks_[kAtlasCount];
+  std::uint32_t slots_[kAtlasCount] = {};
+  std::unordered_map<std::uint32_t, std::uint32_t> placed_;  // the pack's brick word -> ours
+};
+
+// One grid as arrays, ready to be copied. Layouts: shaders/interface.h.
+struct GpuGrid {
+  format::GridFrame frame{};
+  format::CellBox cells{};
+  Index index = Index::flat;
+  std::vector<std::uint32_t> table;     // flat: an entry a cell; tree: Node5 words; dense: Node4 number + 1 a child
+  std::vector<std::uint32_t> node4;     // tree: Node4 words; dense: a record a child
+  std::vector<std::uint32_t> children;  // tree: records
+  std::vector<format::Node3> records;   // number - 1
+  std::vector<format::Mask3> masks;
+  std::uint32_t absent5 = 0;  // tree, dense: record where Node5 has no child
+  bool skippable = true;      // background 0: what is absent contributes nothing
+  std::uint64_t indexBytes() const { return 4 * (table.size() + node4.size() + children.size()); }
+};
+
+GpuGrid buildGpuGrid(const format::GridView& view, Index wanted, BrickSlots& slots);
+
+}  // namespace billow::runtime
+
+#endif  // BILLOW_RUNTIME_GPU_GRID_H

@@ -1,0 +1,185 @@
+#include "memory.h"
+
+#include <utility>
+
+namespace billow::runtime {
+namespace {
+
+Result<std::uint32_t> memoryType(const Device& device, std::uint32_t allowed, VkMemoryPropertyFlags wanted) {
+  for (std::uint32_t i = 0; i < device.memory.memoryTypeCount; ++i) {
+    const bool fits = (device.memory.memoryTypes[i].propertyFlags & wanted) == wanted;
+    if (fits && (allowed >> i & 1u) != 0) return i;
+  }
+  return failure(ErrorCode::unsupported, "the device has no memory of the kind that a buffer or image needs");
+}
+
+Result<VkDeviceMemory> allocate(Device& device, const VkMemoryRequirements& requirements, VkMemoryPropertyFlags wanted,
+                                bool addressable) {
+  if (requirements.size > device.budget - device.used) {
+    return failure(ErrorCode::budget, "an allocation of " + std::to_string(requirements.size) +
+                                          " bytes would exceed the GPU budget of " + std::to_string(device.budget));
+  }
+  const auto type = memoryType(device, requirements.memoryTypeBits, wanted);
+  if (!type) return tl::unexpected(type.error());
+  auto flags = begin<VkMemoryAllocateFlagsInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO);
+  flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
+  auto info = begin<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
+  info.pNext = addressable ? &flags : nullptr;
+  info.allocationSize = requirements.size;
+  info.memoryTypeIndex = *type;
+  VkDeviceMemory memory = VK_NULL_HANDLE;
+  const VkResult result = device.api.vkAllocateMemory(device.host.device, &info, nullptr, &memory);
+  if (result != VK_SUCCESS) return vulkanError("vkAllocateMemory", result);
+  device.used += requirements.size;
+  return memory;
+}
+
+// Sharing between the upload and the draw family.
+template <class Info>
+void shareFamilies(const Device& device, Info& info, std::uint32_t (&families)[2]) {
+  families[0] = device.host.uploadFamily;
+  families[1] = device.host.drawFamily;
+  if (families[0] == families[1]) return;
+  info.sharingMode = VK_SHARING_MODE_CONCURRENT;
+  info.queueFamilyIndexCount = 2;
+  info.pQueueFamilyIndices = families;
+}
+
+}  // namespace
+
+Buffer& Buffer::operator=(Buffer&& other) noexcept {
+  if (this == &other) return *this;
+  reset();
+  device_ = std::exchange(other.device_, nullptr);
+  buffer_ = std::exchange(other.buffer_, VK_NULL_HANDLE);
+  memory_ = std::exchange(other.memory_, VK_NULL_HANDLE);
+  requirements_ = other.requirements_;
+  size_ = other.size_;
+  addressable_ = other.addressable_;
+  mapped_ = std::exchange(other.mapped_, {});
+  return *this;
+}
+
+Result<Buffer> Buffer::make(Device& device, std::uint64_t size, VkBufferUsageFlags usage) {
+  Buffer buffer;
+  buffer.device_ = &device;
+  buffer.size_ = size;
+  buffer.addressable_ = (usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0;
+  auto info = begin<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
+  info.size = size;
+  info.usage = usage;
+  std::uint32_t families[2];
+  shareFamilies(device, info, families);
+  const VkResult result = device.api.vkCreateBuffer(device.host.device, &info, nullptr, &buffer.buffer_);
+  if (result != VK_SUCCESS) return vulkanError("vkCreateBuffer", result);
+  device.api.vkGetBufferMemoryRequirements(device.host.device, buffer.buffer_, &buffer.requirements_);
+  return buffer;
+}
+
+Result<void> Buffer::bind(Placement placement) {
+  const bool map = placement == Placement::mapped;
+  const VkMemoryPropertyFlags wanted =
+      map ? VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT
+          : VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
+  const auto memory = allocate(*device_, requirements_, wanted, addressable_);
+  if (!memory) return tl::unexpected(memory.error());
+  memory_ = *memory;
+  const VkDevice device = device_->host.device;
+  VkResult result = device_->api.vkBindBufferMemory(device, buffer_, memory_, 0);
+  if (result != VK_SUCCESS) return vulkanError("vkBindBufferMemory", result);
+  if (!map) return {};
+  void* data = nullptr;
+  result = device_->api.vkMapMemory(device, memory_, 0, VK_WHOLE_SIZE, 0, &data);
+  if (result != VK_SUCCESS) return vulkanError("vkMapMemory", result);
+  mapped_ = {static_cast<std::byte*>(data), static_cast<std::size_t>(size_)};
+  return {};
+}
+
+void Buffer::reset() {
+  if (device_ == nullptr) return;
+  if (buffer_ != VK_NULL_HANDLE) device_->api.vkDestroyBuffer(device_->host.device, buffer_, nullptr);
+  if (memory_ != VK_NULL_HANDLE) {
+    device_->api.vkFreeMemory(device_->host.device, memory_, nullptr);
+    device_->used -= requirements_.size;
+  }
+  buffer_ = VK_NULL_HANDLE;
+  memory_ = VK_NULL_HANDLE;
+  mapped_ = {};
+  device_ = nullptr;
+}
+
+VkDeviceAddress Buffer::address() const {
+  auto info = begin<VkBufferDeviceAddressInfo>(VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO);
+  info.buffer = buffer_;
+  return device_->api.vkGetBufferDeviceAddress(device_->host.device, &info);
+}
+
+Image3D& Image3D::operator=(Image3D&& other) noexcept {
+  if (this == &other) return *this;
+  reset();
+  device_ = std::exchange(other.device_, nullptr);
+  format_ = other.format_;
+  extent_ = other.extent_;
+  image_ = std::exchange(other.image_, VK_NULL_HANDLE);
+  view_ = std::exchange(other.view_, VK_NULL_HANDLE);
+  memory_ = std::exchange(other.memory_, VK_NULL_HANDLE);
+  requirements_ = other.requirements_;
+  return *this;
+}
+
+Result<Image3D> Image3D::make(Device& device, VkFormat format, VkExtent3D extent) {
+  Image3D image;
+  image.device_ = &device;
+  image.format_ = format;
+  image.extent_ = extent;
+  auto info = begin<VkImageCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO);
+  info.imageType = VK_IMAGE_TYPE_3D;
+  info.format = format;
+  info.extent = extent;
+  info.mipLevels = 1;
+  info.arrayLayers = 1;
+  info.samples = VK_SAMPLE_COUNT_1_BIT;
+  info.tiling = VK_IMAGE_TILING_OPTIMAL;
+  info.usage = VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT;
+  info.initialLayout = VK_IMAGE_LAYOUT_UNDEFINED;
+  std::uint32_t families[2];
+  shareFamilies(device, info, families);
+  const VkResult result = device.api.vkCreateImage(device.host.device, &info, nullptr, &image.image_);
+  if (result != VK_SUCCESS) return vulkanError("vkCreateImage", result);
+  device.api.vkGetImageMemoryRequirements(device.host.device, image.image_, &image.requirements_);
+  return image;
+}
+
+Result<void> Image3D::bind() {
+  const auto memory = allocate(*device_, requirements_, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, false);
+  if (!memory) return tl::unexpected(memory.error());
+  memory_ = *memory;
+  const VkDevice device = device_->host.device;
+  VkResult result = device_->api.vkBindImageMemory(device, image_, memory_, 0);
+  if (result != VK_SUCCESS) return vulkanError("vkBindImageMemory", result);
+  auto info = begin<VkImageViewCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO);
+  info.image = image_;
+  info.viewType = VK_IMAGE_VIEW_TYPE_3D;
+  info.format = format_;
+  info.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+  result = device_->api.vkCreateImageView(device, &info, nullptr, &view_);
+  if (result != VK_SUCCESS) return vulkanError("vkCreateImageView", result);
+  return {};
+}
+
+void Image3D::reset() {
+  if (device_ == nullptr) return;
+  const VkDevice device = device_->host.device;
+  if (view_ != VK_NULL_HANDLE) device_->api.vkDestroyImageView(device, view_, nullptr);
+  if (image_ != VK_NULL_HANDLE) device_->api.vkDestroyImage(device, image_, nullptr);
+  if (memory_ != VK_NULL_HANDLE) {
+    device_->api.vkFreeMemory(device, memory_, nullptr);
+    device_->used -= requirements_.size;
+  }
+  image_ = VK_NULL_HANDLE;
+  view_ = VK_NULL_HANDLE;
+  memory_ = VK_NULL_HANDLE;
+  device_ = nullptr;
+}
+
+}  // namespace billow::runtime

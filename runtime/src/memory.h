@@ -1,0 +1,71 @@
+// Buffers and images with memory of their own; every byte counts against the budget.
+#ifndef BILLOW_RUNTIME_MEMORY_H
+#define BILLOW_RUNTIME_MEMORY_H
+
+#include <cstddef>
+#include <span>
+
+#include "api.h"
+
+namespace billow::runtime {
+
+enum class Placement { device, mapped };
+
+// An object is created first, which tells its size; bind() then allocates. So a frame is checked against the budget
+// before anything is allocated.
+class Buffer {
+ public:
+  Buffer() = default;
+  Buffer(Buffer&& other) noexcept { *this = std::move(other); }
+  Buffer& operator=(Buffer&& other) noexcept;
+  ~Buffer() { reset(); }
+
+  static Result<Buffer> make(Device& device, std::uint64_t size, VkBufferUsageFlags usage);
+  Result<void> bind(Placement placement);
+  void reset();
+
+  VkBuffer handle() const { return buffer_; }
+  std::uint64_t allocationSize() const { return requirements_.size; }
+  VkDeviceAddress address() const;     // of buffers with shader device address usage
+  std::span<std::byte> mapped() const { return mapped_; }
+
+ private:
+  Device* device_ = nullptr;
+  VkBuffer buffer_ = VK_NULL_HANDLE;
+  VkDeviceMemory memory_ = VK_NULL_HANDLE;
+  VkMemoryRequirements requirements_{};
+  std::uint64_t size_ = 0;
+  bool addressable_ = false;
+  std::span<std::byte> mapped_;
+};
+
+class Image3D {
+ public:
+  Image3D() = default;
+  Image3D(Image3D&& other) noexcept { *this = std::move(other); }
+  Image3D& operator=(Image3D&& other) noexcept;
+  ~Image3D() { reset(); }
+
+  // Sampled and written by transfers; concurrent where the host's upload and draw families differ.
+  static Result<Image3D> make(Device& device, VkFormat format, VkExtent3D extent);
+  Result<void> bind();
+  void reset();
+
+  VkImage handle() const { return image_; }
+  VkImageView view() const { return view_; }
+  VkExtent3D extent() const { return extent_; }
+  std::uint64_t allocationSize() const { return requirements_.size; }
+
+ private:
+  Device* device_ = nullptr;
+  VkFormat format_ = VK_FORMAT_UNDEFINED;
+  VkExtent3D extent_{};
+  VkImage image_ = VK_NULL_HANDLE;
+  VkImageView view_ = VK_NULL_HANDLE;
+  VkDeviceMemory memory_ = VK_NULL_HANDLE;
+  VkMemoryRequirements requirements_{};
+};
+
+}  // namespace billow::runtime
+
+#endif  // BILLOW_RUNTIME_MEMORY_H

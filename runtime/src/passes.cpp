@@ -1,0 +1,175 @@
+#include "passes.h"
+
+#include <array>
+#include <cstring>
+#include <span>
+
+#include "spirv.h"
+
+namespace billow::runtime {
+namespace {
+
+// At least as large as any device's uniform buffer alignment.
+constexpr std::uint64_t kParamsStride = (sizeof(gpu::MarchParams) + 255) / 256 * 256;
+constexpr std::uint32_t kPushBytes = 24;  // voxels.comp
+constexpr std::uint32_t kBindings = 6;
+
+VkDescriptorType bindingType(std::uint32_t binding) {
+  if (binding == 0) return VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
+  return binding < 4 ? VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE : VK_DESCRIPTOR_TYPE_STORAGE_IMAGE;
+}
+
+std::span<const std::uint32_t> spirvOf(Shader shader) {
+  if (shader == Shader::marchHalf) return spirv::kMarchHalf;
+  return shader == Shader::marchSingle ? std::span<const std::uint32_t>(spirv::kMarchSingle) : spirv::kVoxels;
+}
+
+}  // namespace
+
+PassKey passKey(const ResidentFrame& frame, Shader shader, Filter filter, Filter shadow) {
+  PassKey key{.shader = shader,
+              .index = gpu::kIndexMixed,
+              .filter = static_cast<std::uint32_t>(filter),
+              .shadow = static_cast<std::uint32_t>(shadow),
+              .grids = 0};
+  for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
+    if (!frame.grids_[slot].present) continue;
+    const std::uint32_t index = static_cast<std::uint32_t>(frame.grids_[slot].index);
+    key.index = key.grids == 0 || key.index == index ? index : gpu::kIndexMixed;
+    key.grids |= 1u << slot;
+  }
+  return key;
+}
+
+Passes::~Passes() {
+  const VkDevice device = device_.host.device;
+  for (const auto& [key, pipeline] : pipelines_) device_.api.vkDestroyPipeline(device, pipeline, nullptr);
+  if (pool_ != VK_NULL_HANDLE) device_.api.vkDestroyDescriptorPool(device, pool_, nullptr);
+  if (pipelineLayout_ != VK_NULL_HANDLE) device_.api.vkDestroyPipelineLayout(device, pipelineLayout_, nullptr);
+  if (setLayout_ != VK_NULL_HANDLE) device_.api.vkDestroyDescriptorSetLayout(device, setLayout_, nullptr);
+}
+
+Result<void> Passes::create() {
+  if (auto made = createLayouts(); !made) return made;
+  if (auto made = createSets(); !made) return made;
+  auto params = Buffer::make(device_, kParamsStride * inFlight_, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT);
+  if (!params) return tl::unexpected(params.error());
+  params_ = std::move(*params);
+  return params_.bind(Placement::mapped);
+}
+
+Result<void> Passes::createLayouts() {
+  std::array<VkDescriptorSetLayoutBinding, kBindings> bindings{};
+  for (std::uint32_t i = 0; i < kBindings; ++i) {
+    bindings[i] = {i, bindingType(i), 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
+  }
+  auto setInfo = begin<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
+  setInfo.bindingCount = kBindings;
+  setInfo.pBindings = bindings.data();
+  VkResult result = device_.api.vkCreateDescriptorSetLayout(device_.host.device, &setInfo, nullptr, &setLayout_);
+  if (result != VK_SUCCESS) return vulkanError("vkCreateDescriptorSetLayout", result);
+  const VkPushConstantRange push{VK_SHADER_STAGE_COMPUTE_BIT, 0, kPushBytes};
+  auto info = begin<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
+  info.setLayoutCount = 1;
+  info.pSetLayouts = &setLayout_;
+  info.pushConstantRangeCount = 1;
+  info.pPushConstantRanges = &push;
+  result = device_.api.vkCreatePipelineLayout(device_.host.device, &info, nullptr, &pipelineLayout_);
+  if (result != VK_SUCCESS) return vulkanError("vkCreatePipelineLayout", result);
+  return {};
+}
+
+Result<void> Passes::createSets() {
+  const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, inFlight_},
+                                        {VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE, 3 * inFlight_},
+                                        {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, 2 * inFlight_}};
+  auto poolInfo = begin<VkDescriptorPoolCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO);
+  poolInfo.maxSets = inFlight_;
+  poolInfo.poolSizeCount = 3;
+  poolInfo.pPoolSizes = sizes;
+  VkResult result = device_.api.vkCreateDescriptorPool(device_.host.device, &poolInfo, nullptr, &pool_);
+  if (result != VK_SUCCESS) return vulkanError("vkCreateDescriptorPool", result);
+  const std::vector<VkDescriptorSetLayout> layouts(inFlight_, setLayout_);
+  sets_.resize(inFlight_);
+  auto info = begin<VkDescriptorSetAllocateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO);
+  info.descriptorPool = pool_;
+  info.descriptorSetCount = inFlight_;
+  info.pSetLayouts = layouts.data();
+  result = device_.api.vkAllocateDescriptorSets(device_.host.device, &info, sets_.data());
+  if (result != VK_SUCCESS) return vulkanError("vkAllocateDescriptorSets", result);
+  return {};
+}
+
+Result<VkPipeline> Passes::pipeline(const PassKey& key) {
+  const auto found = pipelines_.find(key);
+  if (found != pipelines_.end()) return found->second;
+  const auto made = compile(key);
+  if (made) pipelines_[key] = *made;
+  return made;
+}
+
+Result<VkPipeline> Passes::compile(const PassKey& key) {
+  const VkDevice device = device_.host.device;
+  const std::span<const std::uint32_t> code = spirvOf(key.shader);
+  auto moduleInfo = begin<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
+  moduleInfo.codeSize = code.size_bytes();
+  moduleInfo.pCode = code.data();
+  VkShaderModule module = VK_NULL_HANDLE;
+  VkResult result = device_.api.vkCreateShaderModule(device, &moduleInfo, nullptr, &module);
+  if (result != VK_SUCCESS) return vulkanError("vkCreateShaderModule", result);
+  const std::uint32_t constants[] = {key.index, key.filter, key.shadow, key.grids};
+  const VkSpecializationMapEntry entries[] = {{0, 0, 4}, {1, 4, 4}, {2, 8, 4}, {3, 12, 4}};
+  const VkSpecializationInfo specialization{4, entries, sizeof(constants), constants};
+  auto info = begin<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
+  info.stage = begin<VkPipelineShaderStageCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO);
+  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
+  info.stage.module = module;
+  info.stage.pName = "main";
+  info.stage.pSpecializationInfo = &specialization;
+  info.layout = pipelineLayout_;
+  VkPipeline pipeline = VK_NULL_HANDLE;
+  result = device_.api.vkCreateComputePipelines(device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline);
+  device_.api.vkDestroyShaderModule(device, module, nullptr);
+  if (result != VK_SUCCESS) return vulkanError("vkCreateComputePipelines", result);
+  return pipeline;
+}
+
+void Passes::bind(VkCommandBuffer commands, const ResidentFrame& frame, const gpu::MarchParams& params,
+                  VkImageView color, VkImageView depth) {
+  const std::uint64_t offset = next_ * kParamsStride;
+  const VkDescriptorSet set = sets_[next_];
+  next_ = (next_ + 1) % inFlight_;
+  std::memcpy(params_.mapped().subspan(offset, sizeof(params)).data(), &params, sizeof(params));
+  const VkDescriptorBufferInfo bufferInfo{params_.handle(), offset, sizeof(params)};
+  VkImageView views[kBindings] = {};
+  VkImageView anyAtlas = VK_NULL_HANDLE;
+  for (const Image3D& atlas : frame.atlases_) {
+    if (atlas.view() != VK_NULL_HANDLE) anyAtlas = atlas.view();
+  }
+  for (std::uint32_t i = 0; i < kAtlasCount; ++i) {
+    views[1 + i] = frame.atlases_[i].view() != VK_NULL_HANDLE ? frame.atlases_[i].view() : anyAtlas;
+  }
+  views[4] = color;
+  views[5] = depth;
+  std::array<VkDescriptorImageInfo, kBindings> images{};
+  std::array<VkWriteDescriptorSet, kBindings> writes{};
+  std::uint32_t count = 0;
+  for (std::uint32_t i = 0; i < kBindings; ++i) {
+    if (i != 0 && views[i] == VK_NULL_HANDLE) continue;
+    const VkImageLayout layout = i < 4 ? VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL : VK_IMAGE_LAYOUT_GENERAL;
+    images[i] = {VK_NULL_HANDLE, views[i], layout};
+    VkWriteDescriptorSet& write = writes[count++];
+    write = begin<VkWriteDescriptorSet>(VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET);
+    write.dstSet = set;
+    write.dstBinding = i;
+    write.descriptorCount = 1;
+    write.descriptorType = bindingType(i);
+    write.pImageInfo = &images[i];
+    write.pBufferInfo = &bufferInfo;
+  }
+  device_.api.vkUpdateDescriptorSets(device_.host.device, count, writes.data(), 0, nullptr);
+  device_.api.vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelineLayout_, 0, 1, &set, 0,
+                                      nullptr);
+}
+
+}  // namespace billow::runtime

@@ -1,0 +1,61 @@
+// Pipelines, descriptor sets and parameters: what record() needs, all made ahead save for a new combination's pipeline.
+#ifndef BILLOW_RUNTIME_PASSES_H
+#define BILLOW_RUNTIME_PASSES_H
+
+#include <compare>
+#include <map>
+#include <vector>
+
+#include "frame.h"
+
+namespace billow::runtime {
+
+enum class Shader : std::uint32_t { marchHalf, marchSingle, voxels };
+
+// What a pipeline is specialised for.
+struct PassKey {
+  Shader shader = Shader::marchHalf;
+  std::uint32_t index = gpu::kIndexMixed;
+  std::uint32_t filter = gpu::kFilterTrilinear;
+  std::uint32_t shadow = gpu::kFilterTrilinear;
+  std::uint32_t grids = 0;
+  auto operator<=>(const PassKey&) const = default;
+};
+
+PassKey passKey(const ResidentFrame& frame, Shader shader, Filter filter, Filter shadow);
+
+class Passes {
+ public:
+  Passes(Device& device, std::uint32_t inFlight) : device_(device), inFlight_(inFlight) {}
+  Passes(const Passes&) = delete;
+  Passes& operator=(const Passes&) = delete;
+  ~Passes();
+
+  Result<void> create();
+  Result<VkPipeline> pipeline(const PassKey& key);
+
+  // Takes the next descriptor set and parameter slot of the ring, fills and binds them. `color` and `depth` may be null
+  // where the shader has no images.
+  void bind(VkCommandBuffer commands, const ResidentFrame& frame, const gpu::MarchParams& params, VkImageView color,
+            VkImageView depth);
+  VkPipelineLayout layout() const { return pipelineLayout_; }
+
+ private:
+  Result<void> createLayouts();
+  Result<void> createSets();
+  Result<VkPipeline> compile(const PassKey& key);
+
+  Device& device_;
+  std::uint32_t inFlight_;
+  std::uint32_t next_ = 0;
+  VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
+  VkPipelineLayout pipelineLayout_ = VK_NULL_HANDLE;
+  VkDescriptorPool pool_ = VK_NULL_HANDLE;
+  std::vector<VkDescriptorSet> sets_;
+  Buffer params_;
+  std::map<PassKey, VkPipeline> pipelines_;
+};
+
+}  // namespace billow::runtime
+
+#endif  // BILLOW_RUNTIME_PASSES_H

@@ -1,0 +1,131 @@
+#include "upload.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace billow::runtime {
+namespace {
+
+VkImageMemoryBarrier2 layoutBarrier(const Image3D& image, VkImageLayout from, VkImageLayout to) {
+  auto barrier = begin<VkImageMemoryBarrier2>(VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2);
+  const bool first = from == VK_IMAGE_LAYOUT_UNDEFINED;
+  barrier.srcStageMask = first ? VK_PIPELINE_STAGE_2_NONE : VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT;
+  barrier.srcAccessMask = first ? VK_ACCESS_2_NONE : VK_ACCESS_2_TRANSFER_WRITE_BIT;
+  // The second barrier's reader waits on the semaphore, which makes the image visible to it.
+  barrier.dstStageMask = first ? VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT : VK_PIPELINE_STAGE_2_NONE;
+  barrier.dstAccessMask = first ? VK_ACCESS_2_TRANSFER_WRITE_BIT : VK_ACCESS_2_NONE;
+  barrier.oldLayout = from;
+  barrier.newLayout = to;
+  barrier.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+  barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+  barrier.image = image.handle();
+  barrier.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+  return barrier;
+}
+
+void changeLayouts(const Api& api, VkCommandBuffer commands, const ResidentFrame& frame, VkImageLayout from,
+                   VkImageLayout to) {
+  std::vector<VkImageMemoryBarrier2> barriers;
+  for (const Image3D& atlas : frame.atlases_) {
+    if (atlas.handle() != VK_NULL_HANDLE) barriers.push_back(layoutBarrier(atlas, from, to));
+  }
+  auto info = begin<VkDependencyInfo>(VK_STRUCTURE_TYPE_DEPENDENCY_INFO);
+  info.imageMemoryBarrierCount = static_cast<std::uint32_t>(barriers.size());
+  info.pImageMemoryBarriers = barriers.data();
+  api.vkCmdPipelineBarrier2(commands, &info);
+}
+
+void copyAll(const Api& api, VkCommandBuffer commands, const FrameObjects& objects, std::uint64_t bufferBytes) {
+  const ResidentFrame& frame = *objects.frame;
+  if (bufferBytes != 0) {
+    const VkBufferCopy whole{0, 0, bufferBytes};
+    api.vkCmdCopyBuffer(commands, objects.staging.handle(), frame.buffer_.handle(), 1, &whole);
+  }
+  for (std::uint32_t i = 0; i < kAtlasCount; ++i) {
+    if (frame.atlases_[i].handle() == VK_NULL_HANDLE) continue;
+    VkBufferImageCopy copy{};
+    copy.bufferOffset = objects.offsets[i];
+    copy.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
+    copy.imageExtent = frame.atlases_[i].extent();
+    api.vkCmdCopyBufferToImage(commands, objects.staging.handle(), frame.atlases_[i].handle(),
+                               VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &copy);
+  }
+}
+
+}  // namespace
+
+Uploads::~Uploads() {
+  const VkDevice device = device_.host.device;
+  if (pool_ != VK_NULL_HANDLE) device_.api.vkDestroyCommandPool(device, pool_, nullptr);
+  if (semaphore_ != VK_NULL_HANDLE) device_.api.vkDestroySemaphore(device, semaphore_, nullptr);
+}
+
+Result<void> Uploads::create() {
+  auto poolInfo = begin<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
+  poolInfo.flags = VK_COMMAND_POOL_CREATE_TRANSIENT_BIT;
+  poolInfo.queueFamilyIndex = device_.host.uploadFamily;
+  VkResult result = device_.api.vkCreateCommandPool(device_.host.device, &poolInfo, nullptr, &pool_);
+  if (result != VK_SUCCESS) return vulkanError("vkCreateCommandPool", result);
+  auto type = begin<VkSemaphoreTypeCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO);
+  type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
+  auto info = begin<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO);
+  info.pNext = &type;
+  result = device_.api.vkCreateSemaphore(device_.host.device, &info, nullptr, &semaphore_);
+  if (result != VK_SUCCESS) return vulkanError("vkCreateSemaphore", result);
+  return {};
+}
+
+void Uploads::collect() {
+  std::uint64_t done = 0;
+  if (device_.api.vkGetSemaphoreCounterValue(device_.host.device, semaphore_, &done) != VK_SUCCESS) return;
+  std::erase_if(pending_, [&](Pending& upload) {
+    if (upload.value > done) return false;
+    device_.api.vkFreeCommandBuffers(device_.host.device, pool_, 1, &upload.commands);
+    return true;
+  });
+}
+
+Result<VkCommandBuffer> Uploads::record(const FrameObjects& objects) {
+  auto info = begin<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
+  info.commandPool = pool_;
+  info.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
+  info.commandBufferCount = 1;
+  VkCommandBuffer commands = VK_NULL_HANDLE;
+  VkResult result = device_.api.vkAllocateCommandBuffers(device_.host.device, &info, &commands);
+  if (result != VK_SUCCESS) return vulkanError("vkAllocateCommandBuffers", result);
+  auto beginInfo = begin<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
+  beginInfo.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+  result = device_.api.vkBeginCommandBuffer(commands, &beginInfo);
+  if (result != VK_SUCCESS) return vulkanError("vkBeginCommandBuffer", result);
+  const ResidentFrame& frame = *objects.frame;
+  changeLayouts(device_.api, commands, frame, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
+  copyAll(device_.api, commands, objects, frame.bufferBytes_);
+  changeLayouts(device_.api, commands, frame, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+                VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
+  result = device_.api.vkEndCommandBuffer(commands);
+  if (result != VK_SUCCESS) return vulkanError("vkEndCommandBuffer", result);
+  return commands;
+}
+
+Result<void> Uploads::submit(FrameObjects& objects) {
+  const auto commands = record(objects);
+  if (!commands) return tl::unexpected(commands.error());
+  auto commandInfo = begin<VkCommandBufferSubmitInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO);
+  commandInfo.commandBuffer = *commands;
+  auto signal = begin<VkSemaphoreSubmitInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO);
+  signal.semaphore = semaphore_;
+  signal.value = submitted_ + 1;
+  signal.stageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT;
+  auto submitInfo = begin<VkSubmitInfo2>(VK_STRUCTURE_TYPE_SUBMIT_INFO_2);
+  submitInfo.commandBufferInfoCount = 1;
+  submitInfo.pCommandBufferInfos = &commandInfo;
+  submitInfo.signalSemaphoreInfoCount = 1;
+  submitInfo.pSignalSemaphoreInfos = &signal;
+  const VkResult result = device_.api.vkQueueSubmit2(device_.host.uploadQueue, 1, &submitInfo, VK_NULL_HANDLE);
+  if (result != VK_SUCCESS) return vulkanError("vkQueueSubmit2", result);
+  objects.frame->uploadValue_ = ++submitted_;
+  pending_.push_back({submitted_, *commands, std::move(objects.staging)});
+  return {};
+}
+
+}  // namespace billow::runtime

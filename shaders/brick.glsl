@@ -1,0 +1,69 @@
+// A record (Node3) and the value of one of its voxels, to the bit as format::reconstruct gives it.
+#ifndef BILLOW_BRICK
+#define BILLOW_BRICK
+
+#include "bindings.glsl"
+
+struct Record {
+  uint brick;  // encoding << kEncodingShift | atlas slot
+  uint mask;   // GPU mask number, kMaskAll or kMaskTexel
+  float lo;
+  float scale;
+  float tile;
+};
+
+Record loadRecord(uint g, uint number) {
+  PairArray records = PairArray(params.grids[g].tableAndRecords.zw);
+  const uint at = (number - 1u) * 3u;
+  const uvec2 head = records.items[at];
+  const uvec2 range = records.items[at + 1u];
+  const uvec2 rest = records.items[at + 2u];
+  return Record(head.x, head.y, uintBitsToFloat(range.x), uintBitsToFloat(range.y), uintBitsToFloat(rest.x));
+}
+
+ivec3 slotCorner(uint slot, uint layoutBits, ivec3 slotTexels) {
+  const uint xBits = layoutBits & 0xffu;
+  const uint yBits = layoutBits >> 8;
+  const uvec3 at = uvec3(slot & ((1u << xBits) - 1u), slot >> xBits & ((1u << yBits) - 1u), slot >> (xBits + yBits));
+  return ivec3(at) * slotTexels;
+}
+
+uint toInteger(float texel) { return uint(texel * 255.0 + 0.5); }
+
+// The stored integer of voxel v (each component 0 to 7).
+uint fetchTexel(uint brick, ivec3 v) {
+  const uint encoding = brick >> kEncodingShift;
+  const uint slot = brick & kBrickUnitMask;
+  if (encoding == kEncodingConstant) return 0u;
+  if (encoding <= kEncodingBc4X) {
+    if (encoding == kEncodingBc7Y || encoding == kEncodingBc4Y) v = v.xzy;
+    if (encoding == kEncodingBc7X || encoding == kEncodingBc4X) v = v.zyx;
+  }
+  if (encoding <= kEncodingBc7X) {
+    const vec4 texel = texelFetch(atlasBc7, slotCorner(slot, params.atlas.x, ivec3(8, 8, 2)) + ivec3(v.xy, v.z >> 2), 0);
+    return toInteger(texel[v.z & 3]);
+  }
+  if (encoding <= kEncodingBc4X) {
+    return toInteger(texelFetch(atlasBc4, slotCorner(slot, params.atlas.y, ivec3(8)) + v, 0).r);
+  }
+  const uint low = toInteger(texelFetch(atlasR8, slotCorner(slot, params.atlas.z, ivec3(8)) + v, 0).r);
+  if (encoding == kEncodingR8) return low;
+  return low | toInteger(texelFetch(atlasR8, slotCorner(slot + 1u, params.atlas.z, ivec3(8)) + v, 0).r) << 8;
+}
+
+bool isActive(uint g, uint mask, uint texel, ivec3 v) {
+  if (mask == kMaskAll) return true;
+  if (mask == kMaskTexel) return texel != 0u;
+  const uint bit = uint(v.x) << 6 | uint(v.y) << 3 | uint(v.z);
+  return (WordArray(params.grids[g].masksAndNode4.xy).items[mask * 16u + (bit >> 5)] >> (bit & 31u) & 1u) != 0u;
+}
+
+float recordVoxel(uint g, Record record, ivec3 v) {
+  const uint texel = fetchTexel(record.brick, v);
+  if (!isActive(g, record.mask, texel, v)) return record.tile;
+  precise const float product = record.scale * float(texel);
+  precise const float value = record.lo + product;
+  return value;
+}
+
+#endif

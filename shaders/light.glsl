@@ -1,0 +1,41 @@
+// Sun light inside the volume. sunTransmittance() is the only way in which the march asks for it.
+#ifndef BILLOW_LIGHT
+#define BILLOW_LIGHT
+
+#include "medium.glsl"
+
+// Share of the sun's light that reaches p (world, relative to the eye), by marching towards the sun. The reference
+// mode; a cached light volume has this signature too.
+float sunTransmittance(vec3 p) {
+  if (kShadow == kFilterNone) return 1.0;
+  const uint g = extinctionSlot();
+  const Ray ray = makeRay(g, p, params.sun.xyz);
+  const float exit = crossGrid(g, ray).y;
+  if (exit <= 0.0) return 1.0;
+  const float wanted = exit * length(ray.direction) / params.albedo.w;
+  const int count = int(clamp(ceil(wanted), 1.0, float(params.size.z)));
+  const float dt = exit / float(count);
+  float opticalDepth = 0.0;
+  for (int i = 0; i < count; ++i) {
+    const float t = (float(i) + 0.5) * dt;
+    opticalDepth += extinctionOf(sampleGrid(g, ray.origin + ray.direction * t, kShadow)) * dt;
+    if (opticalDepth > 12.0) break;
+  }
+  return exp(-opticalDepth);
+}
+
+// Radiance scattered towards the eye per unit of scattering. Orders after the first are imitated by Wrenninge's sum
+// (Wrenninge, Kulla, Lundqvist 2013, "Oz: the great and volumetric"): each half as strong, half as attenuated and half
+// as directed as the one before.
+vec3 scatteredSun(vec3 p, float cosine) {
+  const float transmittance = sunTransmittance(p);
+  float strength = 1.0;
+  float sum = 0.0;
+  for (int order = 0; order < int(params.sunLight.w); ++order) {
+    sum += strength * henyeyGreenstein(params.sun.w * strength, cosine) * pow(transmittance, strength);
+    strength *= 0.5;
+  }
+  return params.sunLight.rgb * sum;
+}
+
+#endif
