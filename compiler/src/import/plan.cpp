@@ -249,7 +249,8 @@ void checkSelection(const std::vector<Planned>& volumes, const std::vector<std::
     if (known) continue;
     std::vector<std::string> offered;
     for (const Planned& planned : volumes) offered.push_back(planned.offered);
-    throw Error(Fault::input, fmt::format("no grid '{}' in any frame; there is: {}", name, fmt::join(offered, "; ")));
+    throw Error(Fault::commandLine,
+                fmt::format("--grid {}: no such grid in any frame; there is: {}", name, fmt::join(offered, "; ")));
   }
 }
 

@@ -1,0 +1,77 @@
+#include "reconstruct.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "billow/format/brick.h"
+
+namespace billow::command {
+namespace {
+
+std::array<std::int32_t, 3> toSource(const std::uint32_t (&at)[3], const format::GridFrame& frame) {
+  std::array<std::int32_t, 3> result{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    result[axis] = static_cast<std::int32_t>(std::int64_t{at[axis]} + frame.origin[axis]);
+  }
+  return result;
+}
+
+}  // namespace
+
+compiler::ImportedGrid reconstruct(const format::GridView& view) {
+  const format::GridFrame& frame = view.frame();
+  compiler::ImportedGrid grid;
+  grid.present = (frame.flags & format::kGridPresent) != 0;
+  grid.background = frame.background;
+  grid.activeVoxels = frame.activeVoxels;
+  grid.min = frame.valueMin;
+  grid.max = frame.valueMax;
+  for (std::size_t row = 0; row < 3; ++row) {
+    const double* m = &frame.indexToWorld[row * 4];
+    for (std::size_t column = 0; column < 3; ++column) grid.indexToWorld[row * 4 + column] = m[column];
+    // The compiler moved the origin into the translation; a source index goes the other way.
+    grid.indexToWorld[row * 4 + 3] = m[3] - (m[0] * frame.origin[0] + m[1] * frame.origin[1] + m[2] * frame.origin[2]);
+  }
+  grid.leaves.resize(view.leaves().size());
+  for (std::size_t i = 0; i < grid.leaves.size(); ++i) {
+    const format::GridView::Leaf& leaf = view.leaves()[i];
+    grid.leaves[i].origin = toSource(leaf.origin, frame);
+    format::decodeBrick(leaf.node, leaf.mask, leaf.brick, grid.leaves[i].values, grid.leaves[i].active);
+  }
+  for (const format::GridView::Tile& tile : view.tiles()) {
+    grid.tiles.push_back({toSource(tile.origin, frame), tile.dim, tile.value});
+  }
+  return grid;
+}
+
+const format::VolumeRecord& findVolume(const format::Pack& pack, const std::string& name) {
+  if (name.empty() && pack.volumes().size() == 1) return pack.volumes().front();
+  std::vector<std::string_view> names;
+  for (const format::VolumeRecord& volume : pack.volumes()) {
+    if (pack.string(volume.name) == name) return volume;
+    names.push_back(pack.string(volume.name));
+  }
+  throw compiler::Error(
+      compiler::Fault::commandLine,
+      name.empty()
+          ? fmt::format("the pack has {} volumes; choose one with --volume: {}", names.size(), fmt::join(names, ", "))
+          : fmt::format("--volume {}: no such volume; there is: {}", name, fmt::join(names, ", ")));
+}
+
+std::ptrdiff_t findFrame(const format::Pack& pack, const format::VolumeRecord& volume, std::int32_t number) {
+  const auto frames = pack.framesOf(volume);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (frames[i].number == number) return static_cast<std::ptrdiff_t>(i);
+  }
+  return -1;
+}
+
+std::ptrdiff_t findGrid(const format::Pack& pack, const format::VolumeRecord& volume, const std::string& name) {
+  const auto grids = pack.gridsOf(volume);
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    if (pack.string(grids[i].name) == name) return static_cast<std::ptrdiff_t>(i);
+  }
+  return -1;
+}
+
+}  // namespace billow::command
