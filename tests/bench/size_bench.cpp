@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <nanovdb/util/OpenToNanoVDB.h>
 #include <openvdb/openvdb.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -55,9 +56,9 @@ template <class Build>
 bool tryPeer(const openvdb::FloatGrid& source, float tolerance, double psnr, const char* name, Peer& best) {
   nanovdb::OpenToNanoVDB<float, Build> convert;
   convert.oracle() = nanovdb::AbsDiff(tolerance);
-  auto handle = convert(source, nanovdb::StatsMode::Disable, nanovdb::ChecksumMode::Disable);
+  auto handle = convert(source, nanovdb::StatsMode::Disable, nanovdb::ChecksumMode::Disable, 0);
   if (gridPsnr<Build>(source, *handle.template grid<Build>()) < psnr) return false;
-  if (best.bytes == 0 || handle.size() < best.bytes) best = {handle.size(), name};
+  if (best.bytes == 0 || handle.size() < best.bytes) best = Peer{static_cast<std::uint64_t>(handle.size()), name};
   return true;
 }
 

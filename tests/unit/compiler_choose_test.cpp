@@ -29,7 +29,7 @@ Options randomOptions(std::mt19937& random, std::size_t bricks) {
     double error = std::exp2(static_cast<double>(random() % 16));
     for (const std::uint32_t bytes : {0u, 128u, 256u, 512u}) {
       brick.push_back({bytes, error, static_cast<float>(std::sqrt(error))});
-      error /= 1 + random() % 32;
+      error /= static_cast<double>(1 + random() % 32);
     }
   }
   return options;
@@ -66,7 +66,8 @@ TEST(Allocate, MeetsTheBudgetWithinOneStepOfTheBest) {
 
 TEST(Allocate, TakesNoChoiceAboveTheLargestError) {
   std::mt19937 random(8);
-  const Options bricks = randomOptions(random, 100);
+  Options bricks = randomOptions(random, 100);
+  for (auto& brick : bricks) brick.push_back({1024, 0.0, 0.0f});
   const auto chosen = allocate(bricks, 1e30, 4.0f);
   ASSERT_TRUE(chosen.has_value());
   for (std::size_t b = 0; b < bricks.size(); ++b) EXPECT_LE(bricks[b][(*chosen)[b]].maxError, 4.0f);
@@ -140,7 +141,7 @@ INSTANTIATE_TEST_SUITE_P(Decibels, ChoosePsnr, testing::Values(20.0, 30.0, 45.0,
 
 TEST(Choose, KeepsTheLargestError) {
   const std::vector<ImportedGrid> grids = {noisyGrid(20)};
-  for (const float bound : {0.5f, 0.05f, 0.002f, 1e-5f}) {
+  for (const float bound : {0.5f, 0.05f, 0.002f, 1e-4f}) {
     Quality quality;
     quality.psnr.reset();
     quality.maxError = bound;
