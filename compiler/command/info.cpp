@@ -1,0 +1,199 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "command.h"
+#include "pack_summary.h"
+
+namespace billow::command {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kStreamNames[format::kStreamCount] = {"bricks", "masks", "node5", "node4", "node3", "children"};
+constexpr const char* kEncodingNames[format::kEncodingCount] = {"constant", "bc7z", "bc7y", "bc7x", "bc4z",
+                                                                "bc4y",     "bc4x", "r8",   "r16"};
+constexpr const char* kClassNames[format::kBrickClassCount] = {"bc7", "bc4", "r8", "r16"};
+
+Json toJson(const format::GpuBytes& gpu) {
+  Json json;
+  json["indexKind"] = gpu.index == format::GpuIndex::flat ? "flat" : "tree";
+  json["index"] = gpu.indexBytes;
+  json["node3"] = gpu.node3Bytes;
+  json["masks"] = gpu.maskBytes;
+  for (std::uint32_t i = 0; i < format::kBrickClassCount; ++i) json[kClassNames[i]] = gpu.brickBytes[i];
+  json["total"] = gpu.total();
+  return json;
+}
+
+Json toJson(const GridFrameSummary& frame) {
+  Json json;
+  json["frame"] = frame.frame;
+  json["present"] = frame.present;
+  json["activeVoxels"] = frame.activeVoxels;
+  json["bricks"] = frame.bricks;
+  json["psnr"] = frame.psnr ? Json(*frame.psnr) : Json(nullptr);  // null: exact, or nothing is active
+  json["maxError"] = frame.maxError;
+  json["sourceMin"] = frame.sourceMin;
+  json["sourceMax"] = frame.sourceMax;
+  json["gpuBytes"] = toJson(frame.gpu);
+  return json;
+}
+
+Json toJson(const VolumeSummary& volume) {
+  Json json;
+  json["name"] = volume.name;
+  json["framesPerSecond"] = volume.framesPerSecond;
+  json["frames"] = Json::array();
+  for (const format::FrameRecord& frame : volume.frames) {
+    Json row;
+    row["frame"] = frame.number;
+    row["seconds"] = frame.time;
+    if ((frame.flags & format::kFrameHeld) != 0) row["missing"] = "held";
+    if ((frame.flags & format::kFrameBlank) != 0) row["missing"] = "blank";
+    json["frames"].push_back(row);
+  }
+  json["grids"] = Json::array();
+  for (const GridSummary& grid : volume.grids) {
+    Json row;
+    row["name"] = grid.name;
+    row["role"] = grid.role;
+    row["sourceType"] = grid.sourceType;
+    row["frames"] = Json::array();
+    for (const GridFrameSummary& frame : grid.frames) row["frames"].push_back(toJson(frame));
+    json["grids"].push_back(row);
+  }
+  return json;
+}
+
+Json toJson(const PackSummary& pack) {
+  Json json;
+  json["pack"] = pack.path;
+  json["fileBytes"] = pack.fileBytes;
+  json["disk"]["tables"] = pack.tableBytes;
+  json["disk"]["pages"] = pack.storedPageBytes;
+  json["pages"]["count"] = pack.pageCount;
+  json["pages"]["rawBytes"] = pack.rawPageBytes;
+  for (std::uint32_t i = 0; i < format::kStreamCount; ++i) json["pages"][kStreamNames[i]] = pack.rawByStream[i];
+  for (std::uint32_t i = 0; i < format::kEncodingCount; ++i) json["encodings"][kEncodingNames[i]] = pack.encodings[i];
+  const Json info = Json::parse(pack.infoJson, nullptr, false);
+  json["info"] = pack.infoJson.empty() ? Json(nullptr) : info.is_discarded() ? Json(pack.infoJson) : info;
+  json["volumes"] = Json::array();
+  for (const VolumeSummary& volume : pack.volumes) json["volumes"].push_back(toJson(volume));
+  return json;
+}
+
+std::string size(std::uint64_t bytes) {
+  const auto value = static_cast<double>(bytes);
+  if (value < 1e3) return fmt::format("{} B", bytes);
+  if (value < 1e6) return fmt::format("{:.1f} kB", value * 1e-3);
+  if (value < 1e9) return fmt::format("{:.2f} MB", value * 1e-6);
+  return fmt::format("{:.2f} GB", value * 1e-9);
+}
+
+std::string psnrText(const GridFrameSummary& frame) {
+  if (frame.psnr) return fmt::format("{:.2f} dB", *frame.psnr);
+  return frame.activeVoxels > 0 ? "exact" : "-";
+}
+
+std::string frameText(const VolumeSummary& volume) {
+  if (volume.frames.empty()) return "no frames";
+  const auto count = [&](std::uint32_t flag) {
+    return std::count_if(volume.frames.begin(), volume.frames.end(),
+                         [&](const format::FrameRecord& frame) { return (frame.flags & flag) != 0; });
+  };
+  std::string text =
+      fmt::format("{} frame{} ({} to {}) at {:g} a second", volume.frames.size(), volume.frames.size() == 1 ? "" : "s",
+                  volume.frames.front().number, volume.frames.back().number, volume.framesPerSecond);
+  if (const auto held = count(format::kFrameHeld)) text += fmt::format(", {} missing and held", held);
+  if (const auto blank = count(format::kFrameBlank)) text += fmt::format(", {} missing and blank", blank);
+  return text;
+}
+
+void printGrid(const GridSummary& grid) {
+  fmt::print("\n  {} ({}), used as {}\n", grid.name, grid.sourceType, grid.role);
+  fmt::print("  {:>8} {:>13} {:>9} {:>9} {:>11} {:>11} {:>23}\n", "frame", "active voxels", "bricks", "PSNR",
+             "max error", "on the GPU", "source values");
+  for (const GridFrameSummary& frame : grid.frames) {
+    if (!frame.present) {
+      fmt::print("  {:>8} {:>13}\n", frame.frame, "not there");
+      continue;
+    }
+    fmt::print("  {:>8} {:>13} {:>9} {:>9} {:>11.4g} {:>11} {:>23}\n", frame.frame, frame.activeVoxels, frame.bricks,
+               psnrText(frame), frame.maxError, size(frame.gpu.total()),
+               fmt::format("{:.4g} to {:.4g}", frame.sourceMin, frame.sourceMax));
+  }
+}
+
+// The frame that needs the most memory, by kind.
+void printLargestFrame(const VolumeSummary& volume) {
+  format::GpuBytes largest;
+  std::int32_t number = 0;
+  for (std::size_t f = 0; f < volume.frames.size(); ++f) {
+    format::GpuBytes sum;
+    for (const GridSummary& grid : volume.grids) {
+      sum.indexBytes += grid.frames[f].gpu.indexBytes;
+      sum.node3Bytes += grid.frames[f].gpu.node3Bytes;
+      sum.maskBytes += grid.frames[f].gpu.maskBytes;
+      for (std::uint32_t i = 0; i < format::kBrickClassCount; ++i)
+        sum.brickBytes[i] += grid.frames[f].gpu.brickBytes[i];
+    }
+    if (sum.total() < largest.total()) continue;
+    largest = sum;
+    number = volume.frames[f].number;
+  }
+  if (largest.total() == 0) return;
+  std::string kinds = fmt::format("index {}, brick headers {}, masks {}", size(largest.indexBytes),
+                                  size(largest.node3Bytes), size(largest.maskBytes));
+  for (std::uint32_t i = 0; i < format::kBrickClassCount; ++i) {
+    if (largest.brickBytes[i] > 0) kinds += fmt::format(", {} {}", kClassNames[i], size(largest.brickBytes[i]));
+  }
+  fmt::print("\n  Largest frame on the GPU: {}, {} ({})\n", number, size(largest.total()), kinds);
+}
+
+void printText(const PackSummary& pack) {
+  fmt::print("{}: {} (pages {}, {} when unpacked; tables {})\n", pack.path, size(pack.fileBytes),
+             size(pack.storedPageBytes), size(pack.rawPageBytes), size(pack.tableBytes));
+  std::string encodings;
+  for (std::uint32_t i = 0; i < format::kEncodingCount; ++i) {
+    if (pack.encodings[i] > 0) encodings += fmt::format("  {} {}", kEncodingNames[i], pack.encodings[i]);
+  }
+  if (!encodings.empty()) fmt::print("Bricks by encoding, over all frames:{}\n", encodings);
+  for (const VolumeSummary& volume : pack.volumes) {
+    fmt::print("\n{}: {}\n", volume.name, frameText(volume));
+    for (const GridSummary& grid : volume.grids) printGrid(grid);
+    printLargestFrame(volume);
+  }
+}
+
+int runInfo(const std::string& path, bool json) {
+  const format::Result<PackSummary> pack = summarise(path);
+  if (!pack) return reportIssue(path, pack.error());
+  if (json) {
+    fmt::print("{}\n", toJson(*pack).dump(2, ' ', false, Json::error_handler_t::replace));
+  } else {
+    printText(*pack);
+  }
+  return kDone;
+}
+
+}  // namespace
+
+void addInfo(CLI::App& app, Run& run) {
+  CLI::App* command = app.add_subcommand("info", "Say what is in a pack: grids, frames, error, bytes on disk and GPU");
+  struct Arguments {
+    std::string pack;
+    bool json = false;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  command->add_option("PACK", arguments->pack, "The .blw file")->required();
+  command->add_flag("--json", arguments->json, "One JSON object on stdout, and nothing else");
+  command->footer(
+      "PSNR is 20 log10(range / rmse) over active voxels, range that of the source's values and background.\n"
+      "Exit codes: 0 done, 1 command line, 2 the file cannot be read, 3 it is no sound pack.");
+  command->callback([&run, arguments] { run = [arguments] { return runInfo(arguments->pack, arguments->json); }; });
+}
+
+}  // namespace billow::command

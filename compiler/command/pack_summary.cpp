@@ -1,0 +1,99 @@
+#include "pack_summary.h"
+
+#include <cmath>
+#include <cstring>
+
+#include "billow/format/brick.h"
+
+namespace billow::command {
+namespace {
+
+constexpr const char* kRoleNames[format::kRoleCount] = {"none",       "extinction", "temperature", "flames",
+                                                        "velocity x", "velocity y", "velocity z",  "colour r",
+                                                        "colour g",   "colour b",   "fuel"};
+constexpr const char* kTypeNames[format::kSourceTypeCount] = {"float", "half", "double", "int32", "int64",
+                                                              "bool",  "mask", "vec3f",  "vec3d", "vec3i"};
+
+// 20 log10(range / rmse), with the source's range, background included.
+std::optional<double> psnrOf(const format::GridFrame& frame) {
+  if (!(frame.squaredError > 0) || frame.activeVoxels == 0) return std::nullopt;
+  const double range = static_cast<double>(frame.sourceMax) - static_cast<double>(frame.sourceMin);
+  return 20 * std::log10(range / std::sqrt(frame.squaredError / static_cast<double>(frame.activeVoxels)));
+}
+
+GridFrameSummary summariseFrame(const format::GridFrame& frame, std::int32_t number) {
+  GridFrameSummary summary;
+  summary.frame = number;
+  summary.present = (frame.flags & format::kGridPresent) != 0;
+  summary.activeVoxels = frame.activeVoxels;
+  summary.psnr = psnrOf(frame);
+  summary.maxError = static_cast<double>(frame.maxError);
+  summary.sourceMin = static_cast<double>(frame.sourceMin);
+  summary.sourceMax = static_cast<double>(frame.sourceMax);
+  summary.bricks = frame.node3Count;
+  summary.gpu = format::gpuBytes(frame);
+  return summary;
+}
+
+VolumeSummary summariseVolume(const format::Pack& pack, const format::VolumeRecord& volume) {
+  VolumeSummary summary;
+  summary.name = pack.string(volume.name);
+  summary.framesPerSecond = static_cast<double>(volume.framesPerSecond);
+  const auto frames = pack.framesOf(volume);
+  summary.frames.assign(frames.begin(), frames.end());
+  for (std::uint32_t g = 0; g < volume.gridCount; ++g) {
+    const format::GridRecord& record = pack.gridsOf(volume)[g];
+    GridSummary grid;
+    grid.name = pack.string(record.name);
+    grid.role = kRoleNames[record.role];
+    grid.sourceType = kTypeNames[record.sourceType];
+    for (std::uint32_t f = 0; f < volume.frameCount; ++f) {
+      grid.frames.push_back(summariseFrame(pack.gridFrame(volume, f, g), frames[f].number));
+    }
+    summary.grids.push_back(std::move(grid));
+  }
+  return summary;
+}
+
+std::optional<format::Issue> countEncodings(const format::Pack& pack, PackSummary& summary) {
+  for (std::uint32_t p = 0; p < pack.pages().size(); ++p) {
+    const format::PageRecord& record = pack.pages()[p];
+    if (record.streams[static_cast<std::uint32_t>(format::Stream::node3)].count == 0) continue;
+    const format::Result<format::Page> page = pack.readPage(p);
+    if (!page) return page.error();
+    const auto bytes = page->stream(record, format::Stream::node3);
+    for (std::size_t at = 0; at < bytes.size(); at += sizeof(format::Node3)) {
+      format::Node3 node;
+      std::memcpy(&node, bytes.data() + at, sizeof node);
+      if (format::encodingOf(node) < format::kEncodingCount) ++summary.encodings[format::encodingOf(node)];
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+format::Result<PackSummary> summarise(const std::string& path) {
+  const format::Result<format::Pack> pack = format::Pack::openFile(path);
+  if (!pack) return tl::make_unexpected(pack.error());
+  PackSummary summary;
+  summary.path = path;
+  summary.fileBytes = pack->fileSize();
+  summary.pageCount = pack->pages().size();
+  for (const format::PageRecord& page : pack->pages()) {
+    summary.storedPageBytes += page.storedSize;
+    summary.rawPageBytes += page.rawSize;
+    for (std::uint32_t s = 0; s < format::kStreamCount; ++s) {
+      summary.rawByStream[s] += std::uint64_t{page.streams[s].count} * format::kStreamItemBytes[s];
+    }
+  }
+  summary.tableBytes = summary.fileBytes - summary.storedPageBytes;
+  if (std::optional<format::Issue> issue = countEncodings(*pack, summary)) return tl::make_unexpected(*issue);
+  format::Result<std::string> info = pack->infoJson();
+  if (!info) return tl::make_unexpected(info.error());
+  summary.infoJson = std::move(*info);
+  for (const format::VolumeRecord& volume : pack->volumes()) summary.volumes.push_back(summariseVolume(*pack, volume));
+  return summary;
+}
+
+}  // namespace billow::command
