@@ -88,7 +88,8 @@ struct Device {
   std::uint32_t maxImageExtent3D = 0;
   std::uint64_t budget = 0;
   std::uint64_t used = 0;
-  bool blockImages = false;  // BC7 and BC4 as sampled 3D images
+  bool bc7 = false;  // as sampled 3D images; else such bricks are decoded to R8
+  bool bc4 = false;
 };
 
 tl::unexpected<Error> vulkanError(const char* call, VkResult result);

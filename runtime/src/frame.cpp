@@ -153,13 +153,13 @@ bool ResidentFrame::empty() const {
 }
 
 Result<StagedFrame> stageFrame(const Device& device, const format::Pack& pack, std::uint32_t volume,
-                               std::uint32_t frame, const UploadOptions& options, bool decodeBlocks) {
+                               std::uint32_t frame, const UploadOptions& options) {
   if (volume >= pack.volumes().size()) return failure(ErrorCode::argument, "the pack has no such volume");
   const format::VolumeRecord& record = pack.volumes()[volume];
   if (frame >= record.frameCount) return failure(ErrorCode::argument, "the volume has no such frame");
   const GridChoice choice = options.grids.value_or(chooseGrids(pack, record));
   const std::uint32_t numbers[gpu::kGridSlots] = {choice.extinction, choice.temperature, choice.flames};
-  StagedFrame staged{.views = {}, .grids = {}, .shapes = {}, .slots = BrickSlots(decodeBlocks), .bufferBytes = 0};
+  StagedFrame staged{.views = {}, .grids = {}, .shapes = {}, .slots = BrickSlots(device.bc7, device.bc4), .bufferBytes = 0};
   // Views must not move while bricks and masks are read from them.
   staged.views.reserve(gpu::kGridSlots);
   for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {

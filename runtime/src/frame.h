@@ -50,7 +50,7 @@ struct StagedFrame {
 
 // Loads and checks the grids, builds indices and gives out slots. Allocates nothing on the device.
 Result<StagedFrame> stageFrame(const Device& device, const format::Pack& pack, std::uint32_t volume,
-                               std::uint32_t frame, const UploadOptions& options, bool decodeBlocks);
+                               std::uint32_t frame, const UploadOptions& options);
 
 // Creates the frame's objects and its staging buffer, checks them against the budget, then allocates and fills the
 // staging memory. `offsets` receives where each atlas begins in it; the buffer's bytes are at 0.

@@ -117,7 +117,9 @@ std::uint32_t BrickSlots::place(const GridView::Leaf& leaf) {
   if (encoding == format::kEncodingConstant) return 0;
   const auto [entry, fresh] = placed_.try_emplace(leaf.node.brick, 0);
   if (!fresh) return entry->second;
-  const std::uint32_t stored = decodeBlocks_ && encoding < format::kEncodingR8 ? format::kEncodingR8 : encoding;
+  const AtlasClass own = atlasClassOf(encoding);
+  const bool decoded = (own == AtlasClass::bc7 && !bc7_) || (own == AtlasClass::bc4 && !bc4_);
+  const std::uint32_t stored = decoded ? format::kEncodingR8 : encoding;
   const std::uint32_t which = static_cast<std::uint32_t>(atlasClassOf(stored));
   bricks_[which].push_back({leaf.brick, encoding, slots_[which]});
   entry->second = stored << format::kEncodingShift | slots_[which];

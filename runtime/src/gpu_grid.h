@@ -27,7 +27,8 @@ struct AtlasBrick {
 // Gives bricks slots; what is equal in the pack (same unit) gets one slot, whichever grid asks.
 class BrickSlots {
  public:
-  explicit BrickSlots(bool decodeBlocks) : decodeBlocks_(decodeBlocks) {}
+  // Bricks of a kind that the device does not take are decoded to R8.
+  BrickSlots(bool bc7, bool bc4) : bc7_(bc7), bc4_(bc4) {}
 
   // The record's brick word: encoding on the GPU << kEncodingShift | slot.
   std::uint32_t place(const format::GridView::Leaf& leaf);
@@ -36,7 +37,7 @@ class BrickSlots {
   std::uint32_t slots(AtlasClass which) const { return slots_[static_cast<std::uint32_t>(which)]; }
 
  private:
-  bool decodeBlocks_;
+  bool bc7_, bc4_;
   std::vector<AtlasBrick> bricks_[kAtlasCount];
   std::uint32_t slots_[kAtlasCount] = {};
   std::unordered_map<std::uint32_t, std::uint32_t> placed_;  // the pack's brick word -> ours

@@ -22,15 +22,19 @@ bool sampled3D(const Device& device, VkFormat format) {
 }
 
 Result<void> describeDevice(Device& device) {
+  auto driver = begin<VkPhysicalDeviceVulkan12Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_PROPERTIES);
   auto properties = begin<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
+  properties.pNext = &driver;
   device.api.vkGetPhysicalDeviceProperties2(device.host.physicalDevice, &properties);
   if (properties.properties.apiVersion < VK_API_VERSION_1_3) {
     return failure(ErrorCode::unsupported, std::string(properties.properties.deviceName) + " has no Vulkan 1.3");
   }
   device.maxImageExtent3D = properties.properties.limits.maxImageDimension3D;
   device.api.vkGetPhysicalDeviceMemoryProperties(device.host.physicalDevice, &device.memory);
-  device.blockImages = device.host.textureCompressionBc && sampled3D(device, VK_FORMAT_BC7_UNORM_BLOCK) &&
-                       sampled3D(device, VK_FORMAT_BC4_UNORM_BLOCK);
+  device.bc7 = device.host.textureCompressionBc && sampled3D(device, VK_FORMAT_BC7_UNORM_BLOCK);
+  device.bc4 = device.host.textureCompressionBc && sampled3D(device, VK_FORMAT_BC4_UNORM_BLOCK);
+  // Mesa's software decoder truncates what BC4 interpolates, which is off by one from what the format promises.
+  if (driver.driverID == VK_DRIVER_ID_MESA_LLVMPIPE) device.bc4 = false;
   return {};
 }
 
@@ -64,7 +68,7 @@ class RendererImpl final : public Renderer {
 
   Result<void> initialise(const Config& config) {
     if (auto known = describeDevice(device_); !known) return known;
-    decodeBlocks_ = config.decodeBlocks || !device_.blockImages;
+    if (config.decodeBlocks) device_.bc7 = device_.bc4 = false;
     if (auto made = passes_.create(); !made) return made;
     return uploads_.create();
   }
@@ -72,7 +76,7 @@ class RendererImpl final : public Renderer {
   Result<std::unique_ptr<Frame>> upload(const format::Pack& pack, std::uint32_t volume, std::uint32_t frame,
                                         const UploadOptions& options) override {
     uploads_.collect();
-    const auto staged = stageFrame(device_, pack, volume, frame, options, decodeBlocks_);
+    const auto staged = stageFrame(device_, pack, volume, frame, options);
     if (!staged) return tl::unexpected(staged.error());
     auto objects = makeFrameObjects(device_, *staged);
     if (!objects) return tl::unexpected(objects.error());
@@ -122,7 +126,6 @@ class RendererImpl final : public Renderer {
 
  private:
   Device device_;
-  bool decodeBlocks_ = false;
   Passes passes_;
   Uploads uploads_;
 };

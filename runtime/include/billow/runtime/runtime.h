@@ -157,11 +157,11 @@ struct Background {
 
 struct DrawInfo {
   const Frame* frame = nullptr;
-  View view;
-  Sun sun;
-  Look look;
-  Quality quality;
-  Background background;
+  View view = {};
+  Sun sun = {};
+  Look look = {};
+  Quality quality = {};
+  Background background = {};
   std::uint32_t width = 0, height = 0;  // of both images
   ColorFormat colorFormat = ColorFormat::half;
   VkImageView color = VK_NULL_HANDLE;  // storage image, premultiplied linear RGBA

@@ -1,0 +1,220 @@
+// The GPU's getVoxel gives the same bits as the CPU's, for every encoding, index and atlas; trilinear reads are what
+// the eight voxels around make of them.
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <set>
+#include <tuple>
+
+#include "gpu_fixture.h"
+
+namespace billow::tests {
+namespace {
+
+using format::GridView;
+using runtime::Filter;
+using runtime::Index;
+
+format::Mask3 someMask(std::uint32_t seed) {
+  std::mt19937 random(seed);
+  format::Mask3 mask;
+  for (std::uint32_t& word : mask.words) word = static_cast<std::uint32_t>(random());
+  return mask;
+}
+
+// Every encoding beside every other, all kinds of masks, bricks at the edges of nodes, and a tile.
+std::vector<std::byte> everything() {
+  return oneGridPack(0.0625f, [](GridFrameBuilder& grid) {
+    using namespace format;
+    for (std::uint32_t encoding = 0; encoding < kEncodingCount; ++encoding) {
+      const std::uint32_t bytes = *brickBytes(encoding);
+      float scale = 0.003f + 0.01f * static_cast<float>(encoding);
+      if (encoding == kEncodingConstant) scale = 0;
+      if (encoding == kEncodingR16) scale = 0.0003f;
+      grid.brick({14 + encoding / 3, 15 + encoding % 3, 16}, encoding, randomBytes(bytes, encoding), -0.7f, scale,
+                 kMaskAll);
+      grid.brick({14 + encoding / 3, 15 + encoding % 3, 17}, encoding, randomBytes(bytes, 90 + encoding), 0.3f, scale,
+                 0, someMask(encoding));
+    }
+    grid.brick({14, 14, 14}, kEncodingR8, randomBytes(512, 40), 1, 0.07f, kMaskTexel);
+    grid.brick({14, 14, 15}, kEncodingR16, randomBytes(1024, 41), 1, 0.0007f, kMaskTexel);
+    grid.tile({1, 0, 0}, 2.5f);
+  });
+}
+
+// Centres of all voxels of all leaves with their neighbours, of tiles' corners, and some far outside.
+std::vector<float> interestingVoxels(const GridView& view) {
+  std::set<std::tuple<int, int, int>> voxels;
+  for (const GridView::Leaf& leaf : view.leaves()) {
+    for (int i = 0; i < 1000; ++i) {
+      const int local[3] = {i / 100 - 1, i / 10 % 10 - 1, i % 10 - 1};
+      voxels.insert({static_cast<int>(leaf.origin[0]) + local[0], static_cast<int>(leaf.origin[1]) + local[1],
+                     static_cast<int>(leaf.origin[2]) + local[2]});
+    }
+  }
+  for (const GridView::Tile& tile : view.tiles()) {
+    for (int i = 0; i < 64; ++i) {
+      const auto at = [&](int axis, int step) {
+        const int dim = static_cast<int>(tile.dim);
+        const int offsets[4] = {-1, 0, dim - 1, dim};
+        return static_cast<int>(tile.origin[axis]) + offsets[step];
+      };
+      voxels.insert({at(0, i / 16), at(1, i / 4 % 4), at(2, i % 4)});
+    }
+  }
+  voxels.insert({-5, 0, 0});
+  voxels.insert({4095, 4095, 4095});
+  voxels.insert({5000, 10, 10});
+  std::vector<float> positions;
+  for (const auto& [x, y, z] : voxels) {
+    positions.insert(positions.end(), {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)});
+  }
+  return positions;
+}
+
+float cpuVoxel(const GridView& view, const float* position) {
+  return view.voxel(std::lround(position[0]), std::lround(position[1]), std::lround(position[2]));
+}
+
+double cpuTrilinear(const GridView& view, const float* p) {
+  double sum = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    double weight = 1;
+    std::int64_t at[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const double base = std::floor(double{p[axis]});
+      const int upper = corner >> axis & 1;
+      weight *= upper != 0 ? p[axis] - base : 1 - (p[axis] - base);
+      at[axis] = static_cast<std::int64_t>(base) + upper;
+    }
+    sum += weight * double{view.voxel(at[0], at[1], at[2])};
+  }
+  return sum;
+}
+
+struct LookupCase {
+  Index index;
+  bool decodeBlocks;
+};
+
+class Lookup : public GpuTest, public testing::WithParamInterface<LookupCase> {};
+
+TEST_P(Lookup, NearestIsTheSameToTheBit) {
+  const format::Pack pack = openPack(everything());
+  const auto view = GridView::load(pack, pack.gridFrames()[0]);
+  ASSERT_TRUE(view.has_value());
+  const auto renderer = makeRenderer({.decodeBlocks = GetParam().decodeBlocks});
+  const auto frame = upload(*renderer, pack, 0, {.index = GetParam().index});
+  const std::vector<float> positions = interestingVoxels(*view);
+  const auto values = gpu().lookup(*renderer, *frame, 0, Filter::nearest, positions);
+  ASSERT_TRUE(values.has_value()) << values.error().message;
+  std::size_t wrong = 0;
+  for (std::size_t i = 0; i < values->size(); ++i) {
+    const float expected = cpuVoxel(*view, &positions[i * 3]);
+    if (std::bit_cast<std::uint32_t>((*values)[i]) == std::bit_cast<std::uint32_t>(expected)) continue;
+    if (++wrong > 5) continue;
+    ADD_FAILURE() << "(" << positions[i * 3] << ", " << positions[i * 3 + 1] << ", " << positions[i * 3 + 2]
+                  << "): GPU " << (*values)[i] << ", CPU " << expected;
+  }
+  EXPECT_EQ(wrong, 0u) << "of " << values->size();
+}
+
+TEST_P(Lookup, TrilinearIsExactAcrossFaces) {
+  const format::Pack pack = openPack(everything());
+  const auto view = GridView::load(pack, pack.gridFrames()[0]);
+  ASSERT_TRUE(view.has_value());
+  const auto renderer = makeRenderer({.decodeBlocks = GetParam().decodeBlocks});
+  const auto frame = upload(*renderer, pack, 0, {.index = GetParam().index});
+  std::vector<float> positions;
+  std::mt19937 random(5);
+  for (int i = 0; i < 3 * 8000; ++i) {
+    const float low = i % 3 == 2 ? 110 : 104;
+    positions.push_back(low + static_cast<float>(random() % 4096) / 4096 * 44);
+  }
+  const auto values = gpu().lookup(*renderer, *frame, 0, Filter::trilinear, positions);
+  ASSERT_TRUE(values.has_value()) << values.error().message;
+  for (std::size_t i = 0; i < values->size(); ++i) {
+    // Three linear steps of rounding on values up to 60.
+    ASSERT_NEAR((*values)[i], cpuTrilinear(*view, &positions[i * 3]), 3e-5) << "sample " << i;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Lookup,
+                         testing::Values(LookupCase{Index::flat, false}, LookupCase{Index::tree, false},
+                                         LookupCase{Index::dense, false}, LookupCase{Index::flat, true},
+                                         LookupCase{Index::tree, true}));
+
+class Upload : public GpuTest {};
+
+TEST_F(Upload, CountsTheBytesThatTheFormatPromises) {
+  const format::Pack pack = openPack(oneGridPack(0, [](GridFrameBuilder& grid) {
+    for (std::uint32_t i = 0; i < 7; ++i) {
+      grid.brick({10, 10, 10 + i}, format::kEncodingBc7Z, randomBytes(128, i), 0, 0.01f, format::kMaskAll);
+    }
+    grid.brick({10, 11, 10}, format::kEncodingR8, randomBytes(512, 9), 0, 0.01f, 0, someMask(1));
+    grid.brick({10, 11, 11}, format::kEncodingR16, randomBytes(1024, 9), 0, 0.0001f, format::kMaskAll);
+  }));
+  const auto renderer = makeRenderer();
+  const std::uint64_t before = renderer->bytesInUse();
+  const auto frame = upload(*renderer, pack);
+  const format::GpuBytes promised = format::gpuBytes(pack.gridFrames()[0]);
+  EXPECT_EQ(frame->stats().payload(), promised.total());
+  EXPECT_EQ(frame->stats().maskBytes, promised.maskBytes);
+  EXPECT_EQ(frame->stats().bricks[0], 7u);
+  EXPECT_EQ(frame->stats().bricks[2], 3u);
+  EXPECT_GE(frame->stats().allocatedBytes, frame->stats().payload());
+  EXPECT_GE(renderer->bytesInUse(), before + frame->stats().allocatedBytes);
+  gpu().waitIdle();
+}
+
+TEST_F(Upload, RefusesWhatExceedsTheBudgetAndAllocatesNothing) {
+  const format::Pack pack = openPack(everything());
+  const auto renderer = makeRenderer({.gpuBudget = 24000});
+  const std::uint64_t before = renderer->bytesInUse();
+  const auto frame = renderer->upload(pack, 0, 0, {});
+  ASSERT_FALSE(frame.has_value());
+  EXPECT_EQ(frame.error().code, runtime::ErrorCode::budget);
+  EXPECT_EQ(renderer->bytesInUse(), before);
+}
+
+TEST_F(Upload, GivesStagingBackOnceItIsDone) {
+  const format::Pack pack = openPack(everything());
+  const auto renderer = makeRenderer();
+  auto first = upload(*renderer, pack);
+  gpu().waitIdle();
+  auto second = upload(*renderer, pack);
+  gpu().waitIdle();
+  const std::uint64_t withTwo = renderer->bytesInUse();
+  first.reset();
+  const std::uint64_t withOne = renderer->bytesInUse();
+  EXPECT_EQ(withTwo - withOne, second->stats().allocatedBytes);
+  second.reset();
+  EXPECT_LT(renderer->bytesInUse(), withOne);
+}
+
+TEST_F(Upload, TakesFramesWithoutAnythingActive) {
+  const format::Pack pack = openPack(smallestPack());
+  const auto renderer = makeRenderer();
+  const auto frame = upload(*renderer, pack);
+  EXPECT_TRUE(frame->empty());
+  const auto picture = gpu().render(*renderer, {.frame = frame.get(), .width = 9, .height = 5});
+  ASSERT_TRUE(picture.has_value()) << picture.error().message;
+  for (const float value : picture->rgba) EXPECT_EQ(value, 0);
+  for (const float value : picture->depth) EXPECT_TRUE(std::isinf(value));
+}
+
+TEST_F(Upload, NamesWhatIsOutOfRange) {
+  const format::Pack pack = openPack(everything());
+  const auto renderer = makeRenderer();
+  EXPECT_EQ(renderer->upload(pack, 1, 0, {}).error().code, runtime::ErrorCode::argument);
+  EXPECT_EQ(renderer->upload(pack, 0, 1, {}).error().code, runtime::ErrorCode::argument);
+  const auto frame = upload(*renderer, pack);
+  const auto bad = gpu().render(*renderer, {.frame = frame.get(), .quality = {.step = 0}, .width = 4, .height = 4});
+  ASSERT_FALSE(bad.has_value());
+  EXPECT_NE(bad.error().message.find("quality.step"), std::string::npos);
+  gpu().waitIdle();
+}
+
+}  // namespace
+}  // namespace billow::tests
