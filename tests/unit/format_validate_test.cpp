@@ -107,7 +107,7 @@ TEST(Damage, EveryChangedByteIsFound) {
   std::vector<std::byte> bytes = sample();
   for (std::size_t i = 0; i < bytes.size(); ++i) {
     const std::byte before = bytes[i];
-    for (const int flip : {0x01, 0x80, 0xff}) {
+    for (const int flip : {0x01, 0x02, 0x04, 0x08, 0x10, 0x20, 0x40, 0x80, 0xff}) {
       bytes[i] = before ^ static_cast<std::byte>(flip);
       EXPECT_TRUE(hasError(bytes)) << "byte " << i << " xor " << flip;
       loaderStop(bytes);  // may or may not notice: padding is the validator's; it must not crash
