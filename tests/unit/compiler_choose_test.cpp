@@ -58,9 +58,9 @@ TEST(Allocate, MeetsTheBudgetWithinOneStepOfTheBest) {
       EXPECT_EQ(best, ~0u);
       continue;
     }
-    EXPECT_LE(errorOf(bricks, *chosen), budget);
-    EXPECT_GE(bytesOf(bricks, *chosen), best);
-    EXPECT_LE(bytesOf(bricks, *chosen), best + 512);
+    EXPECT_LE(errorOf(bricks, chosen->chosen), budget);
+    EXPECT_GE(bytesOf(bricks, chosen->chosen), best);
+    EXPECT_LE(bytesOf(bricks, chosen->chosen), best + 512);
   }
 }
 
@@ -70,7 +70,7 @@ TEST(Allocate, TakesNoChoiceAboveTheLargestError) {
   for (auto& brick : bricks) brick.push_back({1024, 0.0, 0.0f});
   const auto chosen = allocate(bricks, 1e30, 4.0f);
   ASSERT_TRUE(chosen.has_value());
-  for (std::size_t b = 0; b < bricks.size(); ++b) EXPECT_LE(bricks[b][(*chosen)[b]].maxError, 4.0f);
+  for (std::size_t b = 0; b < bricks.size(); ++b) EXPECT_LE(bricks[b][chosen->chosen[b]].maxError, 4.0f);
 }
 
 TEST(Allocate, SaysWhenNothingReachesTheError) {

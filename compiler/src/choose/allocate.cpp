@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
 #include "choose/choose.h"
 
@@ -38,8 +39,8 @@ std::vector<std::uint32_t> hullOf(const std::vector<Choice>& choices, std::optio
 
 }  // namespace
 
-std::optional<std::vector<std::uint32_t>> allocate(std::span<const std::vector<Choice>> bricks, double budget,
-                                                   std::optional<float> maxError) {
+std::optional<Allocation> allocate(std::span<const std::vector<Choice>> bricks, double budget,
+                                   std::optional<float> maxError) {
   std::vector<std::uint32_t> chosen(bricks.size());
   std::vector<Step> steps;
   for (std::uint32_t b = 0; b < bricks.size(); ++b) {
@@ -68,7 +69,7 @@ std::optional<std::vector<std::uint32_t>> allocate(std::span<const std::vector<C
       error -= bricks[step.brick][chosen[step.brick]].squaredError - bricks[step.brick][step.to].squaredError;
       chosen[step.brick] = step.to;
     }
-    if (total() <= budget) return chosen;
+    if (total() <= budget) return Allocation{std::move(chosen), next == 0 ? 0 : steps[next - 1].gain};
     if (next == steps.size()) return std::nullopt;
   }
 }

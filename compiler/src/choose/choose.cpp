@@ -99,13 +99,24 @@ class GridChooser {
     }
   }
 
-  void tryBlocks() {
+  void tryScalarBlocks() {
     forEachBrick([this](std::size_t i, Candidate& candidate) {
       if (quiet_[i]) return;
       encodeR8(source(i), candidate);
       add(i, candidate);
       encodeBc4BestAxis(source(i), candidate);
       add(i, candidate);
+    });
+  }
+
+  // BC7 is by far the dearest to try, so it is left out where it cannot pay. Without it, the cheapest mix at the budget
+  // has a Lagrange multiplier; a brick is passed over where even an optimistic BC7 would lose against its other choices
+  // at that multiplier, halved and doubled (with BC7 in the mix it moves a little).
+  void tryBc7(double budget) {
+    const auto without = quality_.gpuBudget || quality_.maxError ? std::nullopt : solve(budget);
+    forEachBrick([&](std::size_t i, Candidate& candidate) {
+      if (quiet_[i]) return;
+      if (without && !bc7MayPay(i, without->multiplier * 0.5) && !bc7MayPay(i, without->multiplier * 2)) return;
       encodeBc7BestAxis(source(i), quality_.effort, candidate);
       add(i, candidate);
     });
@@ -119,9 +130,7 @@ class GridChooser {
     });
   }
 
-  std::optional<std::vector<std::uint32_t>> solve(double budget) const {
-    return allocate(choices_, budget, quality_.maxError);
-  }
+  std::optional<Allocation> solve(double budget) const { return allocate(choices_, budget, quality_.maxError); }
 
   // The cheapest choices at `psnr` dB, with 16-bit bricks tried where nothing less will do.
   std::vector<std::uint32_t> solveOrThrow(std::optional<double> psnr, const std::string& where) {
@@ -134,7 +143,7 @@ class GridChooser {
       throw Error(Fault::input,
                   fmt::format("{}: the error asked for is out of reach: {}; ask for less", where, best()));
     }
-    return *chosen;
+    return std::move(chosen->chosen);
   }
 
   // GPU bytes of the grid with these choices, before equal nodes are shared.
@@ -185,6 +194,16 @@ class GridChooser {
   BrickSource source(std::size_t i) const {
     return {&grid_.leaves[i].values, &grid_.leaves[i].active, counts_[i], grid_.background};
   }
+  // choices_[i] holds constant, R8 and BC4. BC7 spends half of BC4's bits; on bricks where it shines it comes within
+  // kBc7Optimism of BC4's error.
+  bool bc7MayPay(std::size_t i, double multiplier) const {
+    constexpr double kBc7Optimism = 1.5;
+    const std::vector<Choice>& choices = choices_[i];
+    const auto cost = [&](const Choice& choice) { return choice.squaredError + multiplier * choice.bytes; };
+    const Choice& bc4 = choices[2];
+    const Choice hoped{bc4.bytes - 128, bc4.squaredError * kBc7Optimism, 0};
+    return cost(hoped) < std::min({cost(choices[0]), cost(choices[1]), cost(bc4)});
+  }
   void add(std::size_t i, const Candidate& candidate) {
     const std::uint32_t bytes = *format::brickBytes(candidate.encoding);
     const bool stored = counts_[i] != format::kBrickVoxels && !candidate.texelMask;
@@ -230,7 +249,7 @@ std::vector<std::vector<std::uint32_t>> fitBudget(std::vector<std::unique_ptr<Gr
       if (!choosers[g]) continue;
       auto solved = choosers[g]->solve(choosers[g]->budget(step / 64.0));
       if (!solved) return false;
-      chosen[g] = std::move(*solved);
+      chosen[g] = std::move(solved->chosen);
       bytes += choosers[g]->gpuBytes(chosen[g], where(g));
     }
     if (step == 0) least = bytes;
@@ -261,7 +280,8 @@ std::vector<ChosenGrid> chooseEncodings(std::span<const ImportedGrid> grids, con
     choosers[g] = std::make_unique<GridChooser>(grids[g], quality);
     choosers[g]->tryConstants();
     choosers[g]->settleQuietBricks(quality.gpuBudget ? 0 : choosers[g]->budget(quality.psnr));
-    choosers[g]->tryBlocks();
+    choosers[g]->tryScalarBlocks();
+    choosers[g]->tryBc7(choosers[g]->budget(quality.psnr));
     if (quality.maxError) choosers[g]->tryR16();
   }
   std::vector<std::vector<std::uint32_t>> chosen(grids.size());

@@ -51,11 +51,16 @@ struct Choice {
   float maxError = 0;
 };
 
+struct Allocation {
+  std::vector<std::uint32_t> chosen;  // an index into each brick's choices
+  double multiplier = 0;  // squared error that the last byte saved: the Lagrange multiplier; 0: no byte spent
+};
+
 // Picks one choice a brick so that the sum of squared errors is at most `budget` at (nearly) the fewest bytes: greedy
 // along each brick's lower convex hull, steepest step first, ties by brick number. Choices with maxError above
-// `maxError` are not taken. nullopt: not reachable. The result holds an index into each brick's choices.
-std::optional<std::vector<std::uint32_t>> allocate(std::span<const std::vector<Choice>> bricks, double budget,
-                                                   std::optional<float> maxError);
+// `maxError` are not taken. nullopt: not reachable.
+std::optional<Allocation> allocate(std::span<const std::vector<Choice>> bricks, double budget,
+                                   std::optional<float> maxError);
 
 }  // namespace billow::compiler
 
