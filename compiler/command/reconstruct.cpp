@@ -32,11 +32,16 @@ compiler::ImportedGrid reconstruct(const format::GridView& view) {
     // The compiler moved the origin into the translation; a source index goes the other way.
     grid.indexToWorld[row * 4 + 3] = m[3] - (m[0] * frame.origin[0] + m[1] * frame.origin[1] + m[2] * frame.origin[2]);
   }
-  grid.leaves.resize(view.leaves().size());
-  for (std::size_t i = 0; i < grid.leaves.size(); ++i) {
-    const format::GridView::Leaf& leaf = view.leaves()[i];
-    grid.leaves[i].origin = toSource(leaf.origin, frame);
-    format::decodeBrick(leaf.node, leaf.mask, leaf.brick, grid.leaves[i].values, grid.leaves[i].active);
+  grid.leaves.reserve(view.leaves().size());
+  for (const format::GridView::Leaf& leaf : view.leaves()) {
+    const auto origin = toSource(leaf.origin, frame);
+    if (format::encodingOf(leaf.node) == format::kEncodingConstant && leaf.node.mask == format::kMaskAll) {
+      grid.tiles.push_back({origin, 8, leaf.node.lo});  // as OpenVDB keeps it: 2 KiB less
+      continue;
+    }
+    compiler::Leaf& target = grid.leaves.emplace_back();
+    target.origin = origin;
+    format::decodeBrick(leaf.node, leaf.mask, leaf.brick, target.values, target.active);
   }
   for (const format::GridView::Tile& tile : view.tiles()) {
     grid.tiles.push_back({toSource(tile.origin, frame), tile.dim, tile.value});

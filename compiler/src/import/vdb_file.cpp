@@ -66,15 +66,23 @@ constexpr std::array<std::pair<std::string_view, std::uint64_t>, 8> kMapBytes{{
     {"NonlinearFrustumMap", 0},  // refused before its tree is looked at
 }};
 
-// OpenVDB allocates what these two counts ask for, before it looks at the bytes.
+// One array of delayed-load metadata: stored bytes (0: not compressed), then as many, or `raw` of them.
+void skipDelayedLoadArray(ByteReader& reader, std::uint32_t stored, std::uint64_t raw) {
+  if (stored == 0) return reader.skip(raw, "delayed-load metadata");
+  skipBlosc(reader, stored, raw);
+}
+
+// OpenVDB allocates what these counts ask for and hands the rest to Blosc, before it looks at either.
 void checkDelayedLoad(ByteReader& reader, std::uint32_t bytes) {
   if (bytes == 0) return;  // a grid without leaves
-  if (bytes < 8) reader.fail("delayed-load metadata is too short");
+  const std::uint64_t end = reader.position() + bytes;
   const auto leaves = reader.value<std::uint32_t>("delayed-load metadata");
-  const auto stored = reader.value<std::uint32_t>("delayed-load metadata");
-  if (stored != 0xffffffffu && stored > bytes - 8) reader.fail("delayed-load metadata is longer than its size");
   if (leaves > reader.size() / 64) reader.fail("delayed-load metadata counts more leaves than the file can hold");
-  reader.skip(bytes - 8, "delayed-load metadata");
+  skipDelayedLoadArray(reader, reader.value<std::uint32_t>("delayed-load metadata"), leaves);
+  const auto sizes = reader.value<std::uint32_t>("delayed-load metadata");
+  constexpr std::uint32_t kNoSizes = 0xffffffffu;
+  if (sizes != kNoSizes) skipDelayedLoadArray(reader, sizes, std::uint64_t{leaves} * 8);
+  if (reader.position() != end) reader.fail("delayed-load metadata has another size than it says");
 }
 
 void readMetadataValue(ByteReader& reader, const std::string& name, const std::string& type, VdbGrid* grid) {
@@ -87,6 +95,10 @@ void readMetadataValue(ByteReader& reader, const std::string& name, const std::s
   if (grid != nullptr && name == "class" && type == "string" && bytes <= 64) {
     grid->gridClass.resize(bytes);
     return reader.read(grid->gridClass.data(), bytes, "the grid's class");
+  }
+  if (grid != nullptr && name == "is_saved_as_half_float" && type == "bool") {
+    grid->halfFlag = reader.value<std::uint8_t>("metadata") != 0;
+    return;
   }
   reader.skip(bytes, "metadata");
 }
@@ -106,6 +118,8 @@ void readGridHead(ByteReader& reader, VdbGrid& grid) {
   grid.compression = reader.value<std::uint32_t>("a grid's compression");
   if (grid.compression > 7) reader.fail(fmt::format("unknown compression {:#x}", grid.compression));
   readMetadata(reader, &grid);
+  // The type's name says it and the metadata say it; OpenVDB goes by the latter, for the values' size.
+  if (grid.half != grid.halfFlag) reader.fail("the grid's type and metadata differ in whether it is saved as half");
   grid.mapType = reader.string("a transform's type");
   const auto map =
       std::find_if(kMapBytes.begin(), kMapBytes.end(), [&](const auto& m) { return m.first == grid.mapType; });

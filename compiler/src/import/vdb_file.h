@@ -31,6 +31,7 @@ struct VdbGrid {
   std::string name;        // "density"; without a name "unnamed"; repeated ones get _1, _2, ... in the file's order
   std::string treeType;    // without the suffix for half
   bool half = false;
+  bool halfFlag = false;          // the same, as the metadata say it
   std::string instanceParent;     // unique name of the grid whose tree this one shares, or ""
   const VdbType* type = nullptr;  // null: cannot be compiled
   std::string gridClass;          // "fog volume", "level set", ... or "" where not known

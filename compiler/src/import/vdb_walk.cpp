@@ -142,21 +142,8 @@ class Walker {
     }
     const auto size = static_cast<std::uint64_t>(stored);
     if (size > reader_.remaining()) reader_.skip(size, "a compressed block");
-    if ((grid_.compression & kCompressBlosc) != 0) return skipBlosc(size, bytes);
+    if ((grid_.compression & kCompressBlosc) != 0) return skipBlosc(reader_, size, bytes);
     reader_.skip(size, "a compressed block");
-  }
-
-  // Blosc's own header: version, codec, flags, type size; then raw, block and compressed size.
-  void skipBlosc(std::uint64_t size, std::uint64_t bytes) {
-    if (size < 16) reader_.fail("a compressed block is shorter than its header");
-    reader_.skip(4, "a compressed block");
-    const auto raw = reader_.value<std::uint32_t>("a compressed block");
-    const auto block = reader_.value<std::uint32_t>("a compressed block");
-    const auto compressed = reader_.value<std::uint32_t>("a compressed block");
-    if (raw != bytes || compressed != size || block == 0 || (raw != 0 && block > raw)) {
-      reader_.fail("a compressed block's header is wrong");
-    }
-    reader_.skip(size - 16, "a compressed block");
   }
 
   ByteReader& reader_;
@@ -167,6 +154,23 @@ class Walker {
 };
 
 }  // namespace
+
+// The header: version, codec version, flags, type size; then raw, block and compressed size.
+void skipBlosc(ByteReader& reader, std::uint64_t stored, std::uint64_t raw) {
+  constexpr std::uint64_t kHeaderBytes = 16;
+  if (stored < kHeaderBytes) reader.fail("a compressed block is shorter than its header");
+  reader.skip(4, "a compressed block");
+  const auto rawSize = reader.value<std::uint32_t>("a compressed block");
+  const auto blockSize = reader.value<std::uint32_t>("a compressed block");
+  const auto storedSize = reader.value<std::uint32_t>("a compressed block");
+  // OpenVDB pads short data before it compresses them.
+  constexpr std::uint64_t kPaddedBytes = 128;
+  const bool sizeFits = rawSize == raw || (raw < kPaddedBytes && rawSize == kPaddedBytes);
+  if (!sizeFits || storedSize != stored || blockSize == 0 || (rawSize != 0 && blockSize > rawSize)) {
+    reader.fail("a compressed block's header is wrong");
+  }
+  reader.skip(stored - kHeaderBytes, "a compressed block");
+}
 
 void walkTree(ByteReader& reader, const VdbGrid& grid) {
   try {

@@ -82,6 +82,14 @@ openvdb::GridBase::Ptr makeGrid(const VdbOutput& output) {
   return grid;
 }
 
+// The rename at the end would put a file in the place of a device or a folder.
+void checkTarget(const std::string& path) {
+  std::error_code ignored;
+  const auto status = std::filesystem::status(path, ignored);
+  if (!std::filesystem::exists(status) || std::filesystem::is_regular_file(status)) return;
+  throw Error(Fault::file, fmt::format("{}: cannot be written: it is there, and no regular file", path));
+}
+
 // OpenVDB does not always notice a full disk, so what was written is looked at before it gets its name.
 void checkWritten(const std::string& path) {
   const VdbFile file = listVdbFile(path);
@@ -91,6 +99,7 @@ void checkWritten(const std::string& path) {
 }  // namespace
 
 void writeVdb(const std::string& path, std::span<const VdbOutput> grids) {
+  checkTarget(path);
   openvdb::initialize();
   openvdb::GridPtrVec made;
   for (const VdbOutput& output : grids) made.push_back(makeGrid(output));
