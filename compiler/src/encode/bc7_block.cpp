@@ -72,20 +72,12 @@ void putSteps(const std::uint32_t steps[16], std::uint32_t bits, std::uint32_t a
 }  // namespace
 
 Bc7Search bc7Search(int effort) {
-  switch (std::clamp(effort, 0, 5)) {
-    case 0:
-      return {};
-    case 1:
-      return {.passes = 2, .allPBits = false, .rotations = 1, .partitions = 1};
-    case 2:
-      return {.passes = 3, .allPBits = true, .rotations = 1, .partitions = 2};
-    case 3:
-      return {.passes = 3, .allPBits = true, .rotations = 4, .mode4 = true, .partitions = 4};
-    case 4:
-      return {.passes = 4, .allPBits = true, .rotations = 4, .mode4 = true, .partitions = 10, .nudge = true};
-    default:
-      return {.passes = 8, .allPBits = true, .rotations = 4, .mode4 = true, .partitions = 64, .nudge = true};
-  }
+  static constexpr Bc7Search kSearches[] = {
+      // passes, allPBits, rotations, mode4, partitions, nudge, everyAxis
+      {2, false, 0, false, 0, false, false}, {2, false, 1, true, 1, false, false}, {3, false, 1, true, 2, false, false},
+      {3, true, 4, true, 4, false, true},    {4, true, 4, true, 10, true, true},   {8, true, 4, true, 64, true, true},
+  };
+  return kSearches[std::clamp(effort, 0, 5)];
 }
 
 void tryOtherModes(const Plane& plane, const Bc7Search& search, Bc7Fit& best) {

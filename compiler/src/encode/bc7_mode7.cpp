@@ -10,71 +10,120 @@ namespace {
 constexpr float kLevels = 3.0f;
 constexpr std::uint32_t kPartitions = 64;
 
+constexpr std::uint32_t kPairs = 10;  // of four channels, a channel with itself included
+constexpr std::uint32_t kPairOf[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}};
+
 // Sums over a set of texels, from which the residual about the best line follows.
 struct Moments {
-  Float4 product[4] = {splat(0), splat(0), splat(0), splat(0)};  // of deviations, channel by channel
-  Float4 total = splat(0);
-  Float4 count = splat(0);
+  Float4 part[6] = {splat(0), splat(0), splat(0), splat(0), splat(0), splat(0)};  // products by channel, sums, counts
 
-  void add(const Moments& other) {
-    for (int c = 0; c < 4; ++c) product[c] += other.product[c];
-    total += other.total;
-    count += other.count;
+  Moments operator+(const Moments& other) const {
+    Moments both;
+    for (int i = 0; i < 6; ++i) both.part[i] = part[i] + other.part[i];
+    return both;
   }
-  Moments without(const Moments& other) const {
-    Moments rest;
-    for (int c = 0; c < 4; ++c) rest.product[c] = product[c] - other.product[c];
-    rest.total = total - other.total;
-    rest.count = count - other.count;
+};
+
+// The same for four sets at a time, one a lane.
+struct LaneMoments {
+  Float4 product[kPairs];
+  Float4 total[4];
+  Float4 count[4];
+
+  LaneMoments(const Moments& a, const Moments& b, const Moments& c, const Moments& d) {
+    const auto gather = [&](int part, int lane) {
+      return Float4{a.part[part][lane], b.part[part][lane], c.part[part][lane], d.part[part][lane]};
+    };
+    for (int i = 0; i < 4; ++i) {
+      for (int j = i; j < 4; ++j) product[kPairOf[i][j]] = gather(i, j);
+      total[i] = gather(4, i);
+      count[i] = gather(5, i);
+    }
+  }
+  LaneMoments operator-(const LaneMoments& other) const {
+    LaneMoments rest = *this;
+    for (std::uint32_t i = 0; i < kPairs; ++i) rest.product[i] -= other.product[i];
+    for (int c = 0; c < 4; ++c) {
+      rest.total[c] -= other.total[c];
+      rest.count[c] -= other.count[c];
+    }
     return rest;
   }
 };
 
-std::array<Moments, 16> texelMoments(const Plane& plane) {
-  std::array<Moments, 16> moments;
-  for (std::uint32_t i = 0; i < 16; ++i) {
-    Float4 deviation, count;
-    for (std::uint32_t c = 0; c < 4; ++c) {
-      count[c] = plane.weight[c][i >> 2][i & 3];
-      deviation[c] = (plane.value[c][i >> 2][i & 3] - 127.5f) * count[c];
-    }
-    for (std::uint32_t c = 0; c < 4; ++c) moments[i].product[c] = deviation * splat(deviation[c]);
-    moments[i].total = deviation;
-    moments[i].count = count;
+Moments texelMoments(const Plane& plane, std::uint32_t texel) {
+  Float4 deviation, count;
+  for (std::uint32_t c = 0; c < 4; ++c) {
+    count[c] = plane.weight[c][texel >> 2][texel & 3];
+    deviation[c] = (plane.value[c][texel >> 2][texel & 3] - 127.5f) * count[c];
   }
+  Moments moments;
+  for (std::uint32_t c = 0; c < 4; ++c) moments.part[c] = deviation * splat(deviation[c]);
+  moments.part[4] = deviation;
+  moments.part[5] = count;
   return moments;
 }
 
 // About what remains of the squared deviations once the best line is taken out: trace less the largest eigenvalue, by
 // one step of power iteration. Good for ranking only.
-float residual(const Moments& moments) {
-  const Float4 mean = moments.total / max(moments.count, splat(1.0f));
-  Float4 row[4];
-  for (int c = 0; c < 4; ++c) row[c] = moments.product[c] - moments.total * splat(mean[c]);
-  int start = 0;
-  for (int c = 1; c < 4; ++c) {
-    if (row[c][c] > row[start][start]) start = c;
+Float4 residual(const LaneMoments& moments) {
+  Float4 covariance[kPairs];
+  for (int i = 0; i < 4; ++i) {
+    const Float4 mean = moments.total[i] / max(moments.count[i], splat(1.0f));
+    for (int j = i; j < 4; ++j) {
+      covariance[kPairOf[i][j]] = moments.product[kPairOf[i][j]] - moments.total[j] * mean;
+    }
   }
-  const float trace = (row[0][0] + row[1][1]) + (row[2][2] + row[3][3]);
-  const Float4 axis = row[start];
-  const float squares = sum(axis * axis);
-  if (!(squares > 1e-6f)) return trace;
-  const Float4 image =
-      (row[0] * splat(axis[0]) + row[1] * splat(axis[1])) + (row[2] * splat(axis[2]) + row[3] * splat(axis[3]));
-  return trace - sum(image * axis) / squares;
+  Float4 axis[4] = {covariance[0], covariance[1], covariance[2], covariance[3]};
+  Float4 largest = covariance[0];
+  Float4 trace = covariance[0];
+  for (int c = 1; c < 4; ++c) {
+    const Float4 variance = covariance[kPairOf[c][c]];
+    const Int4 larger = variance > largest;
+    largest = select(larger, variance, largest);
+    for (int d = 0; d < 4; ++d) axis[d] = select(larger, covariance[kPairOf[c][d]], axis[d]);
+    trace += variance;
+  }
+  Float4 squares = splat(0);
+  Float4 along = splat(0);
+  for (int c = 0; c < 4; ++c) {
+    const std::uint32_t* row = kPairOf[c];
+    const Float4 image = (covariance[row[0]] * axis[0] + covariance[row[1]] * axis[1]) +
+                         (covariance[row[2]] * axis[2] + covariance[row[3]] * axis[3]);
+    squares += axis[c] * axis[c];
+    along += image * axis[c];
+  }
+  const Int4 hasAxis = squares > splat(1e-6f);
+  return trace - select(hasAxis, along / select(hasAxis, squares, splat(1.0f)), splat(0));
+}
+
+// The moments of every set of texels within each row of four.
+using RowMoments = std::array<std::array<Moments, 16>, 4>;
+
+void sumRows(const Plane& plane, RowMoments& rows) {
+  for (std::uint32_t r = 0; r < 4; ++r) {
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      const std::uint32_t bit = 1u << i;
+      const Moments texel = texelMoments(plane, 4 * r + i);
+      for (std::uint32_t set = 0; set < bit; ++set) rows[r][set | bit] = rows[r][set] + texel;
+    }
+  }
 }
 
 std::array<float, kPartitions> rankPartitions(const Plane& plane) {
-  const std::array<Moments, 16> texels = texelMoments(plane);
-  Moments all;
-  for (const Moments& texel : texels) all.add(texel);
+  RowMoments rows;
+  sumRows(plane, rows);
+  const auto moments = [&](std::uint32_t texels) {
+    return (rows[0][texels & 15] + rows[1][texels >> 4 & 15]) + (rows[2][texels >> 8 & 15] + rows[3][texels >> 12]);
+  };
+  const Moments whole = moments(0xffff);
+  const LaneMoments all(whole, whole, whole, whole);
   std::array<float, kPartitions> residuals;
-  for (std::uint32_t p = 0; p < kPartitions; ++p) {
-    Moments second;
-    for (std::uint32_t i = 0; i < 16; ++i) {
-      if ((format::kBc7Partitions2[p] >> i & 1u) != 0) second.add(texels[i]);
-    }
-    residuals[p] = residual(second) + residual(all.without(second));
+  for (std::uint32_t p = 0; p < kPartitions; p += 4) {
+    const std::uint16_t* texels = format::kBc7Partitions2 + p;
+    const LaneMoments second(moments(texels[0]), moments(texels[1]), moments(texels[2]), moments(texels[3]));
+    const Float4 both = residual(second) + residual(all - second);
+    for (std::uint32_t lane = 0; lane < 4; ++lane) residuals[p + lane] = both[lane];
   }
   return residuals;
 }

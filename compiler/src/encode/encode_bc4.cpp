@@ -85,6 +85,35 @@ Scalars betweenConstants(const Scalars& scalars) {
   return inner;
 }
 
+// Least squares from several starts, since it only finds the optimum nearest to each: the whole range, and ranges that
+// leave out the outermost values.
+void refineEightSteps(const Scalars& scalars, Segment range, Bc4Fit& best) {
+  static constexpr float kInsets[] = {0.0f, 0.06f, 0.12f};
+  const float width = range.second - range.first;
+  for (const float inset : kInsets) {
+    Segment segment = {range.first + inset * width, range.second - inset * width};
+    for (int pass = 0; pass < 2; ++pass) {
+      Float4 position[4];
+      scalarSteps(scalars, segment, 7.0f, position);
+      for (Float4& p : position) p *= splat(1.0f / 7.0f);
+      segment = scalarLeastSquares(scalars, position, segment);
+      tryEightSteps(scalars, segment, best);
+    }
+  }
+}
+
+// Moves one end at a time by a texel or two.
+void nudgeEightSteps(const Scalars& scalars, Bc4Fit& best) {
+  static constexpr float kMoves[] = {-2.0f, -1.0f, 1.0f, 2.0f};
+  if (best.first <= best.second) return;
+  for (const float move : kMoves) {
+    const auto low = static_cast<float>(best.second);
+    tryEightSteps(scalars, {low + move, static_cast<float>(best.first)}, best);
+    const auto high = static_cast<float>(best.first);
+    tryEightSteps(scalars, {static_cast<float>(best.second), high + move}, best);
+  }
+}
+
 Bc4Fit fitBlock(const Scalars& scalars) {
   Bc4Fit best;
   best.error = 1e30f;
@@ -95,14 +124,8 @@ Bc4Fit fitBlock(const Scalars& scalars) {
   if (range.first < 1.0f || range.second > 254.0f) {
     trySixSteps(scalars, scalarRange(betweenConstants(scalars)), best);
   }
-  Segment segment = range;
-  for (int pass = 0; pass < 2; ++pass) {
-    Float4 position[4];
-    scalarSteps(scalars, segment, 7.0f, position);
-    for (Float4& p : position) p *= splat(1.0f / 7.0f);
-    segment = scalarLeastSquares(scalars, position, segment);
-    tryEightSteps(scalars, segment, best);
-  }
+  refineEightSteps(scalars, range, best);
+  nudgeEightSteps(scalars, best);
   return best;
 }
 

@@ -23,7 +23,19 @@ void fitWithMode6(const StoredBrick& stored, const Bc7Search& search, BrickFit& 
 }
 
 void improve(const StoredBrick& stored, const Bc7Search& search, BrickFit& fit) {
-  for (std::uint32_t b = 0; b < kBlocks; ++b) tryOtherModes(stored.plane(b), search, fit.block[b]);
+  fit.error = 0;
+  for (std::uint32_t b = 0; b < kBlocks; ++b) {
+    tryOtherModes(stored.plane(b), search, fit.block[b]);
+    fit.error += fit.block[b].error;
+  }
+}
+
+std::uint32_t leastError(const BrickFit fits[3]) {
+  std::uint32_t least = 0;
+  for (std::uint32_t i = 1; i < 3; ++i) {
+    if (fits[i].error < fits[least].error) least = i;
+  }
+  return least;
 }
 
 void store(const BrickSource& brick, std::uint32_t encoding, TexelRange range, const BrickFit& fit, Candidate& out) {
@@ -54,12 +66,14 @@ void encodeBc7BestAxis(const BrickSource& brick, int effort, Candidate& out) {
   const StoredBrick stored[3] = {StoredBrick(targets, 2), StoredBrick(targets, 1), StoredBrick(targets, 0)};
   const Bc7Search search = bc7Search(effort);
   BrickFit fit[3];
-  std::uint32_t best = 0;
-  for (std::uint32_t i = 0; i < 3; ++i) {
-    fitWithMode6(stored[i], search, fit[i]);
-    if (fit[i].error < fit[best].error) best = i;
+  for (std::uint32_t i = 0; i < 3; ++i) fitWithMode6(stored[i], search, fit[i]);
+  if (search.everyAxis) {
+    for (std::uint32_t i = 0; i < 3; ++i) improve(stored[i], search, fit[i]);
+  } else {
+    const std::uint32_t promising = leastError(fit);
+    improve(stored[promising], search, fit[promising]);
   }
-  improve(stored[best], search, fit[best]);
+  const std::uint32_t best = leastError(fit);
   store(brick, format::kEncodingBc7Z + best, targets.range, fit[best], out);
 }
 
