@@ -250,17 +250,15 @@ bool GridWalk::visitNode3(const Node3& node, std::uint32_t index, BrickFacts& fa
   }
   if (node.mask == kMaskTexel) {
     measureExactly(node, facts);
+  } else if (node.mask == kMaskAll) {
+    facts.active = kBrickVoxels;
+    facts.high.fill(7);
+    boundLoosely(node, facts);
   } else {
-    Mask3 all;
-    std::fill(std::begin(all.words), std::end(all.words), 0xffffffffu);
-    const Mask3* mask = &all;
-    if (node.mask != kMaskAll) {
-      const ItemFinder::Found found = finder_.find(Stream::mask, node.mask, 1);
-      if (found.data == nullptr) return reportMissing("mask", node.mask), false;
-      mask = as<Mask3>(found.data);
-      maskCount_ += std::exchange(reached_[number(Stream::mask)][found.local], kReached) == 0 ? 1 : 0;
-    }
-    measureActive(*mask, facts);
+    const ItemFinder::Found found = finder_.find(Stream::mask, node.mask, 1);
+    if (found.data == nullptr) return reportMissing("mask", node.mask), false;
+    maskCount_ += std::exchange(reached_[number(Stream::mask)][found.local], kReached) == 0 ? 1 : 0;
+    measureActive(*as<Mask3>(found.data), facts);
     boundLoosely(node, facts);
   }
   if (facts.active < kBrickVoxels && node.tile != frame_.background) {

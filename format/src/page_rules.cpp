@@ -170,13 +170,10 @@ bool loadPage(const Pack& pack, std::uint32_t number, Page& page, IssueSink& sin
     return false;
   }
   const PageRecord& record = pack.pages()[number];
-  std::vector<std::byte> stored;
-  if (!readStored(pack, number, stored, sink)) return false;
   page.number = number;
-  if (record.codec == static_cast<std::uint32_t>(Codec::raw)) {
-    page.raw = std::move(stored);
-    return true;
-  }
+  if (record.codec == static_cast<std::uint32_t>(Codec::raw)) return readStored(pack, number, page.raw, sink);
+  thread_local std::vector<std::byte> stored;
+  if (!readStored(pack, number, stored, sink)) return false;
   page.raw.resize(record.rawSize);
   if (decompress(stored, page.raw)) return true;
   sink.report(Rule::pageDecompress, pagePlace(pack, number), fmt::format("It does not give {} bytes.", record.rawSize));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -84,7 +85,9 @@ class Usage {
   std::vector<PageUsage> pages_;
 };
 
-// One run of the validator.
+// One run of the validator. After the tables the work is cut into independent parts: sections to hash, grid frames, and
+// pages that no grid frame lists. A page is decompressed once for each grid frame that lists it, mostly one, and what
+// is wrong with it is reported with the first.
 class Validation {
  public:
   Validation(const ByteSource& source, const ValidateOptions& options)
@@ -98,16 +101,24 @@ class Validation {
     const bool sound = PackReader::read(std::make_unique<BorrowedSource>(source_), pack_, header, collector_);
     if (pack_.sections().empty()) return collector_.issues();
     checkPadding(source_, header, pack_.sections(), collector_);
-    checkSections();
+    checkInfo();
     FirstError probe;
     checkPageTable(PackReader::view(pack_), probe);
-    if (probe.errors() == 0 && !collector_.stopped()) checkPages();
-    if (sound && !collector_.stopped()) checkGridFrames();
+    plan(sound, probe.errors() == 0);
+    if (!collector_.stopped()) checkParts();
+    // After an error, what is not reached may only be out of reach.
+    if (sound && collector_.errors() == 0) usage_->check(pack_, collector_);
     return collector_.issues();
   }
 
  private:
   using Issues = std::vector<Issue>;
+
+  void checkInfo() {
+    const Result<std::string> info = pack_.infoJson();
+    const auto textRule = static_cast<std::uint16_t>(Rule::infoUtf8);
+    if (!info && info.error().kind->id == textRule) keep({info.error()});
+  }
 
   bool keep(Issues issues) {
     for (Issue& issue : issues) {
@@ -116,61 +127,88 @@ class Validation {
     return !collector_.stopped();
   }
 
-  // Those that PackReader has not hashed.
-  void checkSections() {
-    std::vector<SectionEntry> rest;
+  void plan(bool tablesSound, bool pageTableSound) {
     for (const SectionEntry& section : pack_.sections()) {
+      // PackReader has hashed the tables.
       const bool table = section.type != kSectionPages && section.type != kSectionInfo;
-      if (!table || sectionName(section.type).empty()) rest.push_back(section);
+      if (!table || sectionName(section.type).empty()) sections_.push_back(section);
     }
-    const auto work = [&](std::size_t i) {
-      Collector found(limit_);
-      checkSectionBytes(source_, rest[i], found);
-      return std::move(found.issues());
-    };
-    OrderedWork<Issues>(rest.size(), threads_, work, [&](Issues issues) { return keep(std::move(issues)); });
-    const Result<std::string> info = pack_.infoJson();
-    if (!info && info.error().kind->id == static_cast<std::uint16_t>(Rule::infoUtf8)) keep({info.error()});
-  }
-
-  void checkPages() {
+    if (!pageTableSound) return;
     totals_ = streamTotals(pack_.pages());
-    sound_.assign(pack_.pages().size(), 0);
-    const auto work = [&](std::size_t i) {
-      Collector found(limit_);
-      Page page;
-      const auto number = static_cast<std::uint32_t>(i);
-      if (loadPage(pack_, number, page, found)) sound_[i] = checkPageItems(pack_, totals_, page, found) ? 1 : 0;
-      return std::move(found.issues());
-    };
-    OrderedWork<Issues>(pack_.pages().size(), threads_, work, [&](Issues issues) { return keep(std::move(issues)); });
+    usage_.emplace(pack_);
+    owner_.assign(pack_.pages().size(), kNone);
+    if (tablesSound) {
+      gridFrames_ = static_cast<std::uint32_t>(pack_.gridFrames().size());
+      for (std::uint32_t i = 0; i < gridFrames_; ++i) {
+        for (const std::uint32_t page : pack_.pagesOf(pack_.gridFrames()[i])) owner_[page] = std::min(owner_[page], i);
+      }
+    }
+    for (std::uint32_t p = 0; p < owner_.size(); ++p) {
+      if (owner_[p] == kNone) loosePages_.push_back(p);
+    }
   }
 
-  void checkGridFrames() {
-    Usage usage(pack_);
+  void checkParts() {
     const auto work = [&](std::size_t i) {
       Collector found(limit_);
-      checkGridFrame(i, usage, found);
+      if (i < sections_.size()) {
+        checkSectionBytes(source_, sections_[i], found);
+      } else if (i - sections_.size() < gridFrames_) {
+        checkGridFrame(static_cast<std::uint32_t>(i - sections_.size()), found);
+      } else {
+        checkLoosePage(loosePages_[i - sections_.size() - gridFrames_], found);
+      }
       return std::move(found.issues());
     };
-    OrderedWork<Issues>(pack_.gridFrames().size(), threads_, work,
+    OrderedWork<Issues>(sections_.size() + gridFrames_ + loosePages_.size(), threads_, work,
                         [&](Issues issues) { return keep(std::move(issues)); });
-    // After an error, what is not reached may only be out of reach.
-    if (collector_.errors() == 0) usage.check(pack_, collector_);
   }
 
-  void checkGridFrame(std::size_t index, Usage& usage, IssueSink& sink) {
+  void checkLoosePage(std::uint32_t number, IssueSink& sink) const {
+    Page page;
+    if (loadPage(pack_, number, page, sink)) checkPageItems(pack_, totals_, page, sink);
+  }
+
+  void checkGridFrame(std::uint32_t index, IssueSink& sink) {
     const GridFrame& frame = pack_.gridFrames()[index];
     std::vector<Page> pages;
-    for (const std::uint32_t number : pack_.pagesOf(frame)) {
-      // Its own issues are known by now.
-      if (sound_[number] == 0) return;
-      Page page;
-      if (!loadPage(pack_, number, page, sink)) return;
-      pages.push_back(std::move(page));
-    }
+    if (!loadPages(index, pack_.pagesOf(frame), pages, sink)) return;
     GridWalk walk(pack_, totals_, frame, PackReader::view(pack_).gridFramePlace(index), pages, sink);
-    if (walk.check()) usage.add(walk, pages);
+    if (walk.check()) usage_->add(walk, pages);
+  }
+
+  // False when a page is broken.
+  bool loadPages(std::uint32_t gridFrame, std::span<const std::uint32_t> numbers, std::vector<Page>& pages,
+                 IssueSink& sink) const {
+    struct Loaded {
+      Page page;
+      Issues issues;
+      bool sound = false;
+    };
+    const auto load = [&](std::size_t i) {
+      Collector all(limit_);
+      FirstError none;  // the page's owner tells
+      IssueSink& found = owner_[numbers[i]] == gridFrame ? static_cast<IssueSink&>(all) : none;
+      Loaded loaded;
+      loaded.sound =
+          loadPage(pack_, numbers[i], loaded.page, found) && checkPageItems(pack_, totals_, loaded.page, found);
+      loaded.issues = std::move(all.issues());
+      return loaded;
+    };
+    bool sound = true;
+    const auto use = [&](Loaded loaded) {
+      for (Issue& issue : loaded.issues) {
+        sink.report(static_cast<Rule>(issue.kind->id), issue.place, std::move(issue.detail));
+      }
+      sound = sound && loaded.sound;
+      pages.push_back(std::move(loaded.page));
+      return !sink.stopped();
+    };
+    pages.reserve(numbers.size());
+    // Threads that whole grid frames leave idle.
+    const unsigned threads = threads_ / std::max(1u, std::min(threads_, gridFrames_));
+    OrderedWork<Loaded>(numbers.size(), threads, load, use);
+    return sound && !sink.stopped();
   }
 
   const ByteSource& source_;
@@ -179,7 +217,11 @@ class Validation {
   Collector collector_;
   Pack pack_;
   StreamTotals totals_;
-  std::vector<std::uint8_t> sound_;  // by page; a byte each, since threads write neighbours
+  std::vector<SectionEntry> sections_;
+  std::uint32_t gridFrames_ = 0;
+  std::vector<std::uint32_t> loosePages_;
+  std::vector<std::uint32_t> owner_;  // by page: the first grid frame that lists it
+  std::optional<Usage> usage_;
 };
 
 }  // namespace
