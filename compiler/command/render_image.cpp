@@ -1,0 +1,154 @@
+#include "render_image.h"
+
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfOutputFile.h>
+#include <ImfStdIO.h>
+#include <fcntl.h>
+#include <png.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <sstream>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+namespace billow::command {
+namespace {
+
+// A fit of the ACES film curve (Narkowicz 2015, "ACES filmic tone mapping curve"); linear in, linear [0, 1] out.
+float filmic(float x) {
+  x = std::max(x, 0.0f);
+  return std::clamp(x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f), 0.0f, 1.0f);
+}
+
+float srgb(float linear) {
+  return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1 / 2.4f) - 0.055f;
+}
+
+// In [0, 1): hides the bands of a smooth background in 8 bits, the same for every run.
+float dither(std::uint32_t x, std::uint32_t y) {
+  const float a = 0.06711056f * static_cast<float>(x) + 0.00583715f * static_cast<float>(y);
+  const float b = 52.9829189f * (a - std::floor(a));
+  return b - std::floor(b);
+}
+
+std::system_error fileError(const std::string& path, const char* what) {
+  return std::system_error(errno, std::generic_category(), path + ": " + what);
+}
+
+// The unfinished file; removed unless it was renamed.
+class Unfinished {
+ public:
+  explicit Unfinished(const std::string& path) : name_(path + ".XXXXXX") {
+    file_ = mkstemp(name_.data());
+    if (file_ < 0) throw fileError(path, "cannot be written");
+  }
+  Unfinished(const Unfinished&) = delete;
+  Unfinished& operator=(const Unfinished&) = delete;
+  ~Unfinished() {
+    if (file_ >= 0) ::close(file_);
+    if (!name_.empty()) ::unlink(name_.c_str());
+  }
+
+  void write(const std::string& bytes, const std::string& path) {
+    std::size_t done = 0;
+    while (done < bytes.size()) {
+      const ssize_t count = ::write(file_, bytes.data() + done, bytes.size() - done);
+      if (count < 0 && errno == EINTR) continue;
+      if (count <= 0) throw fileError(path, "cannot be written");
+      done += static_cast<std::size_t>(count);
+    }
+  }
+
+  void rename(const std::string& path) {
+    // mkstemp makes files that only their owner reads; a picture is as public as the umask says.
+    const mode_t mask = umask(0);
+    umask(mask);
+    const int file = std::exchange(file_, -1);
+    const bool closed = ::fchmod(file, 0666 & ~mask) == 0 && ::fsync(file) == 0;
+    if (::close(file) != 0 || !closed) throw fileError(path, "cannot be written");
+    if (std::rename(name_.c_str(), path.c_str()) != 0) throw fileError(path, "cannot be written");
+    name_.clear();
+  }
+
+ private:
+  std::string name_;
+  int file_ = -1;
+};
+
+}  // namespace
+
+std::string encodeExr(const headless::Picture& picture) {
+  const std::size_t pixels = std::size_t{picture.width} * picture.height;
+  std::vector<Imath::half> color(pixels * 4);
+  for (std::size_t i = 0; i < color.size(); ++i) {
+    color[i] = Imath::half(std::clamp(picture.rgba[i], -65504.0f, 65504.0f));
+  }
+  Imf::Header header(static_cast<int>(picture.width), static_cast<int>(picture.height));
+  header.compression() = Imf::ZIP_COMPRESSION;
+  Imf::FrameBuffer frameBuffer;
+  const std::size_t pixelBytes = 4 * sizeof(Imath::half);
+  const char* const names[] = {"R", "G", "B", "A"};
+  for (std::size_t c = 0; c < 4; ++c) {
+    header.channels().insert(names[c], Imf::Channel(Imf::HALF));
+    char* first = reinterpret_cast<char*>(color.data() + c);
+    frameBuffer.insert(names[c], Imf::Slice(Imf::HALF, first, pixelBytes, pixelBytes * picture.width));
+  }
+  std::vector<float> depth = picture.depth;
+  header.channels().insert("Z", Imf::Channel(Imf::FLOAT));
+  frameBuffer.insert("Z", Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(depth.data()), sizeof(float),
+                                     sizeof(float) * picture.width));
+  Imf::StdOSStream stream;
+  {
+    Imf::OutputFile file(stream, header);
+    file.setFrameBuffer(frameBuffer);
+    file.writePixels(static_cast<int>(picture.height));
+  }
+  return stream.str();
+}
+
+std::string encodePng(const headless::Picture& picture, float exposure) {
+  const float gain = std::exp2(exposure);
+  std::vector<std::uint8_t> rgb;
+  rgb.reserve(std::size_t{picture.width} * picture.height * 3);
+  for (std::uint32_t y = 0; y < picture.height; ++y) {
+    for (std::uint32_t x = 0; x < picture.width; ++x) {
+      const float* pixel = &picture.rgba[(std::size_t{y} * picture.width + x) * 4];
+      for (int c = 0; c < 3; ++c) {
+        const float value = srgb(filmic(pixel[c] * gain)) * 255 + dither(x, y);
+        rgb.push_back(static_cast<std::uint8_t>(std::clamp(value, 0.0f, 255.0f)));
+      }
+    }
+  }
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = picture.width;
+  image.height = picture.height;
+  image.format = PNG_FORMAT_RGB;
+  png_alloc_size_t size = 0;
+  if (png_image_write_to_memory(&image, nullptr, &size, 0, rgb.data(), 0, nullptr) == 0) {
+    throw std::runtime_error(std::string("libpng: ") + image.message);
+  }
+  std::string bytes(size, '\0');
+  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, rgb.data(), 0, nullptr) == 0) {
+    throw std::runtime_error(std::string("libpng: ") + image.message);
+  }
+  bytes.resize(size);
+  return bytes;
+}
+
+void writeWhole(const std::string& path, const std::string& bytes) {
+  Unfinished file(path);
+  file.write(bytes, path);
+  file.rename(path);
+}
+
+}  // namespace billow::command

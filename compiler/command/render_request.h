@@ -1,0 +1,84 @@
+// What `billow render` is asked for: from the command line, or from a scene file that the command line overrides.
+#ifndef BILLOW_COMMAND_RENDER_REQUEST_H
+#define BILLOW_COMMAND_RENDER_REQUEST_H
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <tl/expected.hpp>
+
+#include "billow/runtime/runtime.h"
+
+namespace billow::command {
+
+struct Refusal {
+  int code;  // Exit
+  std::string message;
+};
+template <class T>
+using Checked = tl::expected<T, Refusal>;
+
+using Triple = std::array<float, 3>;
+
+struct CameraRequest {
+  std::optional<std::array<double, 3>> eye, target;
+  float fieldOfView = 35;  // degrees, vertical
+};
+
+struct LookRequest {
+  std::optional<float> extinctionScale, anisotropy, emissionScale, temperatureScale, temperatureOffset;
+  std::optional<Triple> albedo, ambient;
+  std::optional<std::uint32_t> scatteringOrders;
+  float density = 1;  // factor on the extinction scale
+  float fire = 1;     // factor on the emission scale
+};
+
+struct BackgroundRequest {
+  enum class Kind { automatic, none, colors } kind = Kind::automatic;
+  Triple bottom{}, top{};
+};
+
+// Names of grids; "none" leaves a role out; absent: by the pack's roles.
+struct GridNames {
+  std::optional<std::string> extinction, temperature, flames;
+};
+
+struct RenderRequest {
+  std::string pack;
+  std::optional<std::string> volume;  // default: the first
+  std::int32_t firstFrame = 0, lastFrame = 0;
+  bool range = false;
+  std::string output;
+  std::uint32_t width = 960, height = 540;
+  CameraRequest camera;
+  std::optional<char> up;  // 'y' or 'z'; default: as the data rises
+  std::optional<std::array<float, 3>> sunDirection;
+  std::optional<Triple> sunColor;
+  std::optional<float> sunIntensity;
+  LookRequest look;
+  BackgroundRequest background;
+  GridNames grids;
+  float exposure = 0;  // stops
+  runtime::Filter filter = runtime::Filter::trilinear;
+  float step = 1;  // voxels
+  bool shadows = true;
+  std::uint64_t gpuBudget = std::uint64_t{1} << 30;
+  std::optional<std::uint32_t> device;
+};
+
+// Reads and checks a scene file (spec/scene.schema.json) into `request`; a relative pack path is relative to the scene.
+Checked<void> readScene(const std::string& path, RenderRequest& request);
+
+// The texts of options; each gives a sentence with what was expected where it cannot be read.
+Checked<void> parseFrames(const std::string& text, RenderRequest& request);         // N or N-M
+Checked<void> parseSize(const std::string& text, RenderRequest& request);           // WxH
+Checked<void> parseCamera(const std::string& text, RenderRequest& request);         // x,y,z:x,y,z[:degrees]
+Checked<void> parseBackground(const std::string& text, RenderRequest& request);     // none, r,g,b or r,g,b:r,g,b
+Checked<std::array<float, 3>> parseTriple(const std::string& text, const char* option);
+
+inline constexpr std::uint32_t kLargestPicture = 16384;  // pixels an edge
+
+}  // namespace billow::command
+
+#endif  // BILLOW_COMMAND_RENDER_REQUEST_H

@@ -1,0 +1,23 @@
+// Camera, sun, background and look for a volume: what was asked for, and a good picture where nothing was.
+#ifndef BILLOW_COMMAND_RENDER_SETUP_H
+#define BILLOW_COMMAND_RENDER_SETUP_H
+
+#include "billow/format/pack.h"
+#include "billow/runtime/look.h"
+#include "billow/runtime/runtime.h"
+#include "render_request.h"
+
+namespace billow::command {
+
+// The axis along which the gas rises from the first to the last frame: 'z' unless y is clearly more so.
+char risingAxis(const format::Pack& pack, const format::VolumeRecord& volume, const runtime::GridChoice& grids);
+
+// Everything of a DrawInfo but the frame. [first, last] are frame indices that the camera must frame.
+// `opaque` asks for a background that fills the picture.
+runtime::DrawInfo setUp(const RenderRequest& request, const format::Pack& pack, const format::VolumeRecord& volume,
+                        const runtime::GridChoice& grids, const runtime::Look& suggested, std::uint32_t first,
+                        std::uint32_t last, bool opaque);
+
+}  // namespace billow::command
+
+#endif  // BILLOW_COMMAND_RENDER_SETUP_H
