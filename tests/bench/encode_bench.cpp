@@ -1,14 +1,14 @@
-// How fast each encoding is on one core, and how well it does: a smooth cloud of 256^3 voxels, and whatever bricks are
-// in the file that BILLOW_BRICKS names (records of 512 floats, then a mask of 64 bytes, in brick order).
+// How fast each encoding is on one core, and how well it does alone: on a smooth cloud of 256^3 voxels and, where the
+// environment variable BILLOW_DATA names a folder of sequences, on the middle frames of real ones.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
-#include <fstream>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "../brick_corpus.h"
@@ -51,17 +51,27 @@ Corpus makeCloud() {
   return corpus;
 }
 
-Corpus readBricks(const char* path) {
-  Corpus corpus;
-  std::ifstream file(path, std::ios::binary);
-  Brick brick{};
-  while (file.read(reinterpret_cast<char*>(brick.values.data()), sizeof brick.values) &&
-         file.read(reinterpret_cast<char*>(&brick.active), sizeof brick.active)) {
-    brick.count();
-    add(corpus, brick);
+// The middle frame of a sequence, a corpus per grid that has leaves.
+std::vector<std::pair<std::string, Corpus>> readSequence(const std::string& folder) {
+  const compiler::ImportOptions options;
+  const auto ignore = [](const std::string&) {};
+  const compiler::Plan plan = compiler::planInputs({folder}, options, ignore);
+  std::vector<std::pair<std::string, Corpus>> corpora;
+  for (const compiler::PlannedVolume& volume : plan.volumes) {
+    const compiler::PlannedFrame& planned = volume.frames[volume.frames.size() / 2];
+    const compiler::ImportedFrame frame = compiler::importFrame(volume, planned, options, ignore);
+    for (std::size_t g = 0; g < frame.grids.size(); ++g) {
+      Corpus corpus;
+      for (const compiler::Leaf& leaf : frame.grids[g].leaves) {
+        Brick brick{leaf.values, leaf.active, 0};
+        brick.count();
+        add(corpus, brick);
+      }
+      corpus.range = static_cast<double>(frame.grids[g].max) - static_cast<double>(frame.grids[g].min);
+      if (!corpus.bricks.empty()) corpora.emplace_back(volume.name + "/" + volume.grids[g].name, std::move(corpus));
+    }
   }
-  measureRange(corpus);
-  return corpus;
+  return corpora;
 }
 
 using Encode = std::function<void(const compiler::BrickSource&, compiler::Candidate&)>;
@@ -110,11 +120,13 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   const Corpus cloudCorpus = makeCloud();
   registerAll("cloud256", cloudCorpus);
-  Corpus real;
-  if (const char* path = std::getenv("BILLOW_BRICKS"); path != nullptr) {
-    real = readBricks(path);
-    registerAll("real", real);
+  std::vector<std::pair<std::string, Corpus>> real;
+  if (const char* data = std::getenv("BILLOW_DATA"); data != nullptr) {
+    for (const char* sequence : {"ember", "smoke", "fire", "dust"}) {
+      for (auto& corpus : readSequence(std::string(data) + "/" + sequence)) real.push_back(std::move(corpus));
+    }
   }
+  for (const auto& [name, corpus] : real) registerAll(name, corpus);
   benchmark::RunSpecifiedBenchmarks();
   return 0;
 }
