@@ -2,12 +2,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "choose/choose.h"
 
 namespace billow::compiler {
 namespace {
+
+constexpr float kNoLimit = std::numeric_limits<float>::infinity();
 
 using Options = std::vector<std::vector<Choice>>;
 
@@ -52,7 +55,7 @@ TEST(Allocate, MeetsTheBudgetWithinOneStepOfTheBest) {
   for (int round = 0; round < 200; ++round) {
     const Options bricks = randomOptions(random, 5);
     const double budget = std::exp2(static_cast<double>(random() % 14));
-    const auto chosen = allocate(bricks, budget, std::nullopt);
+    const auto chosen = allocate(bricks, budget, kNoLimit);
     const std::uint32_t best = exhaustive(bricks, budget);
     if (!chosen) {
       EXPECT_EQ(best, ~0u);
@@ -75,9 +78,9 @@ TEST(Allocate, TakesNoChoiceAboveTheLargestError) {
 
 TEST(Allocate, SaysWhenNothingReachesTheError) {
   const Options bricks = {{{0, 10.0, 3.0f}, {128, 5.0, 2.0f}}};
-  EXPECT_FALSE(allocate(bricks, 4.0, std::nullopt).has_value());
+  EXPECT_FALSE(allocate(bricks, 4.0, kNoLimit).has_value());
   EXPECT_FALSE(allocate(bricks, 100.0, 1.0f).has_value());
-  EXPECT_TRUE(allocate(bricks, 5.0, std::nullopt).has_value());
+  EXPECT_TRUE(allocate(bricks, 5.0, kNoLimit).has_value());
 }
 
 // A grid of noisy leaves with ragged masks.

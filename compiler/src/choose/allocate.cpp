@@ -15,10 +15,10 @@ struct Step {
 };
 
 // Indices of the choices on the lower convex hull, by ascending bytes.
-std::vector<std::uint32_t> hullOf(const std::vector<Choice>& choices, std::optional<float> maxError) {
+std::vector<std::uint32_t> hullOf(const std::vector<Choice>& choices, float maxError) {
   std::vector<std::uint32_t> order;
   for (std::uint32_t i = 0; i < choices.size(); ++i) {
-    if (!maxError || choices[i].maxError <= *maxError) order.push_back(i);
+    if (choices[i].maxError <= maxError) order.push_back(i);
   }
   std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
     if (choices[a].bytes != choices[b].bytes) return choices[a].bytes < choices[b].bytes;
@@ -39,8 +39,7 @@ std::vector<std::uint32_t> hullOf(const std::vector<Choice>& choices, std::optio
 
 }  // namespace
 
-std::optional<Allocation> allocate(std::span<const std::vector<Choice>> bricks, double budget,
-                                   std::optional<float> maxError) {
+std::optional<Allocation> allocate(std::span<const std::vector<Choice>> bricks, double budget, float maxError) {
   std::vector<std::uint32_t> chosen(bricks.size());
   std::vector<Step> steps;
   for (std::uint32_t b = 0; b < bricks.size(); ++b) {

@@ -59,8 +59,7 @@ struct Allocation {
 // Picks one choice a brick so that the sum of squared errors is at most `budget` at (nearly) the fewest bytes: greedy
 // along each brick's lower convex hull, steepest step first, ties by brick number. Choices with maxError above
 // `maxError` are not taken. nullopt: not reachable.
-std::optional<Allocation> allocate(std::span<const std::vector<Choice>> bricks, double budget,
-                                   std::optional<float> maxError);
+std::optional<Allocation> allocate(std::span<const std::vector<Choice>> bricks, double budget, float maxError);
 
 }  // namespace billow::compiler
 
