@@ -79,7 +79,7 @@ using Encode = std::function<void(const compiler::BrickSource&, compiler::Candid
 void run(benchmark::State& state, const Corpus& corpus, const Encode& encode) {
   double squared = 0;
   compiler::Candidate candidate;
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     squared = 0;
     for (const Brick& brick : corpus.bricks) {
       encode({&brick.values, &brick.active, brick.activeCount, 0.0f}, candidate);
@@ -92,7 +92,7 @@ void run(benchmark::State& state, const Corpus& corpus, const Encode& encode) {
 }
 
 void registerAll(const std::string& name, const Corpus& corpus) {
-  const auto add = [&](const std::string& what, Encode encode) {
+  const auto add = [&](const std::string& what, const Encode& encode) {
     benchmark::RegisterBenchmark((name + "/" + what).c_str(), [&corpus, encode](benchmark::State& state) {
       run(state, corpus, encode);
     })->Unit(benchmark::kMillisecond);

@@ -73,9 +73,9 @@ void putSteps(const std::uint32_t steps[16], std::uint32_t bits, std::uint32_t a
 
 Bc7Search bc7Search(int effort) {
   static constexpr Bc7Search kSearches[] = {
-      // passes, allPBits, rotations, mode4, partitions, nudge, everyAxis
-      {2, false, 0, false, 0, false, false}, {2, false, 1, true, 1, false, false}, {3, false, 1, true, 2, false, false},
-      {3, true, 4, true, 4, false, true},    {4, true, 4, true, 10, true, true},   {8, true, 4, true, 64, true, true},
+      // passes, rotations, partitions, mode4, allPBits, nudge, everyAxis
+      {2, 0, 0, false, false, false, false}, {2, 1, 1, true, false, false, false}, {3, 1, 2, true, false, false, false},
+      {3, 4, 4, true, true, false, true},    {4, 4, 10, true, true, true, true},   {8, 4, 64, true, true, true, true},
   };
   return kSearches[std::clamp(effort, 0, 5)];
 }

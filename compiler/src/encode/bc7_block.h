@@ -24,13 +24,12 @@ struct Bc7Fit {
 // How much is tried. The higher an effort, the more.
 struct Bc7Search {
   int passes = 2;          // of least squares and requantisation
-  bool allPBits = false;   // every combination, not just the nearest
   int rotations = 0;       // modes 4 and 5: none, the channel that mode 6 serves worst, or all four
-  bool mode4 = false;      // else mode 5 alone
   int partitions = 0;      // of mode 7, the most promising first
+  bool mode4 = false;      // else mode 5 alone
+  bool allPBits = false;   // every combination, not just the nearest
   bool nudge = false;      // each end of mode 6 by single steps
   bool everyAxis = false;  // all modes for each packed axis, not just for the one that mode 6 serves best
-  float goodEnough = 0;    // error of a block from mode 6 alone at which nothing more is tried
 };
 // `effort` in [0, 5]; others are clamped.
 Bc7Search bc7Search(int effort);

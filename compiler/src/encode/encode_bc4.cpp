@@ -16,8 +16,9 @@ struct Bc4Fit {
 };
 
 std::uint32_t toByte(float value) {
-  const float low = value > 0.0f ? value : 0.0f;
-  return static_cast<std::uint32_t>((low < 255.0f ? low : 255.0f) + 0.5f);
+  const float above = value > 0.0f ? value : 0.0f;
+  const float shifted = (above < 255.0f ? above : 255.0f) + 0.5f;
+  return static_cast<std::uint32_t>(shifted);
 }
 
 // What is decoded `step` of `levels` (7 or 5) from first to second: rounded to the nearest integer.
