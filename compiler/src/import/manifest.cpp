@@ -27,7 +27,8 @@ class Node {
   Node(const json& value, const std::string& file, std::string path)
       : value_(value), file_(file), path_(std::move(path)) {}
 
-  const json& value() const { return value_; }
+  // "FILE: /volumes/0", for messages.
+  std::string place() const { return fmt::format("{}: {}", file_, path_.empty() ? "/" : path_); }
 
   [[noreturn]] void fail(const std::string& expected) const {
     std::string text = value_.dump(-1, ' ', false, json::error_handler_t::replace);
@@ -156,6 +157,7 @@ void readMissing(const Node& node, ImportOptions& options) {
 GridRequest readGrid(const Node& node) {
   node.requireObject({"name", "source", "role"});
   GridRequest grid;
+  grid.place = node.place();
   grid.name = node.at("name").string("a grid's name");
   grid.source = node.has("source") ? node.at("source").string("a grid's name in the files") : grid.name;
   if (!node.has("role")) return grid;

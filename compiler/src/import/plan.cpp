@@ -159,14 +159,14 @@ void checkNames(const std::vector<PlannedGrid>& grids, const std::string& volume
 GridList requestedGrids(const VolumeRequest& request, const GridUnion& found) {
   GridList list;
   if (request.grids.empty()) {
-    for (const auto& [name, entry] : found.grids()) list.add({name, name, std::nullopt}, entry);
+    for (const auto& [name, entry] : found.grids()) list.add({name, name, std::nullopt, ""}, entry);
     return list;
   }
   for (const GridRequest& grid : request.grids) {
     const auto entry = found.grids().find(grid.source);
     if (entry == found.grids().end()) {
-      throw Error(Fault::input, fmt::format("volume '{}': no grid '{}' in any frame; there is: {}", request.name,
-                                            grid.source, namesOf(found)));
+      throw Error(Fault::input,
+                  fmt::format("{}: no grid '{}' in any frame; there is: {}", grid.place, grid.source, namesOf(found)));
     }
     list.add(grid, entry->second);
   }

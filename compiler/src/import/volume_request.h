@@ -14,6 +14,7 @@ struct GridRequest {
   std::string name;                  // in the pack
   std::string source;                // in the files
   std::optional<format::Role> role;  // else by name
+  std::string place = {};            // in the manifest, for messages
 };
 
 struct VolumeRequest {
