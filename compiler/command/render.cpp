@@ -23,7 +23,7 @@ struct Arguments {
   std::string input, frames, output;
   std::optional<std::string> size, camera, sunDirection, sunColor, background, up, filter, albedo, ambient;
   std::string method = "direct";
-  bool noShadows = false;
+  std::string shadows = "nearest";
   RenderRequest direct;  // what CLI11 checks by itself
   std::optional<float> fieldOfView, exposure, density, fire;
 };
@@ -97,7 +97,9 @@ void applyNumbers(const Arguments& arguments, RenderRequest& request) {
   request.step = given.step;
   request.gpuBudget = given.gpuBudget;
   request.device = given.device;
-  request.shadows = !arguments.noShadows;
+  request.shadows = arguments.shadows == "none"      ? runtime::Filter::none
+                    : arguments.shadows == "nearest" ? runtime::Filter::nearest
+                                                     : runtime::Filter::trilinear;
   if (arguments.up) request.up = (*arguments.up)[0];
   if (arguments.filter) {
     request.filter = *arguments.filter == "nearest" ? runtime::Filter::nearest : runtime::Filter::trilinear;
@@ -274,7 +276,9 @@ void addLightOptions(CLI::App& command, Arguments& arguments) {
   command.add_option("--sun-color", arguments.sunColor, "Linear r,g,b");
   command.add_option("--sun-intensity", arguments.direct.sunIntensity, "Irradiance")->check(positive);
   command.add_option("--ambient", arguments.ambient, "Light from everywhere, linear r,g,b");
-  command.add_flag("--no-shadows", arguments.noShadows, "The volume casts no shadow on itself");
+  command.add_option("--shadows", arguments.shadows, "The volume's own: none, or between voxels nearest or trilinear")
+      ->check(CLI::IsMember({"none", "nearest", "trilinear"}))
+      ->capture_default_str();
   command.add_option("--density", arguments.density, "Factor on the smoke's density, which fits the data at 1")
       ->check(positive);
   command.add_option("--fire", arguments.fire, "Factor on the fire's brightness, which fits the data at 1")

@@ -62,7 +62,7 @@ struct RenderRequest {
   float exposure = 0;  // stops
   runtime::Filter filter = runtime::Filter::trilinear;
   float step = 1;  // voxels
-  bool shadows = true;
+  runtime::Filter shadows = runtime::Filter::nearest;
   std::uint64_t gpuBudget = std::uint64_t{1} << 30;
   std::optional<std::uint32_t> device;
 };

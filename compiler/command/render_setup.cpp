@@ -11,7 +11,7 @@ using Vec = std::array<double, 3>;
 constexpr double kDegree = 3.14159265358979 / 180;
 constexpr double kAzimuth = 32 * kDegree;    // of the camera, from the front towards the right
 constexpr double kElevation = 14 * kDegree;  // above the horizon
-constexpr double kSunAzimuth = -48 * kDegree;  // from the front towards the left: side light, which shows form
+constexpr double kSunAzimuth = -62 * kDegree;  // from the front towards the left: side light, which shows form
 constexpr double kSunElevation = 42 * kDegree;
 constexpr double kMargin = 1.06;
 
@@ -28,13 +28,16 @@ Vec direction(char up, double azimuth, double elevation) {
 
 Vec upward(char up) { return up == 'y' ? Vec{0, 1, 0} : Vec{0, 0, 1}; }
 
-// How far from the box's centre the eye must be for every corner to lie in the picture.
+// How far from the box's centre the eye must be for the middle of every edge to lie in the picture: gas does not reach
+// into the corners.
 double fittingDistance(const runtime::WorldBox& box, const Vec& center, const runtime::View& view, double aspect) {
   const double tanY = double{view.tanHalfHeight} / kMargin;
   double distance = 0;
-  for (int corner = 0; corner < 8; ++corner) {
+  for (int place = 0; place < 27; ++place) {
+    const int sides[3] = {place / 9 - 1, place / 3 % 3 - 1, place % 3 - 1};
+    if (sides[0] * sides[1] * sides[2] != 0) continue;
     Vec at;
-    for (std::size_t i = 0; i < 3; ++i) at[i] = ((corner >> i & 1) != 0 ? box.max[i] : box.min[i]) - center[i];
+    for (std::size_t i = 0; i < 3; ++i) at[i] = sides[i] * (box.max[i] - center[i]);
     const double across = std::max(std::abs(dot(at, view.right)) / (tanY * aspect), std::abs(dot(at, view.up)) / tanY);
     distance = std::max(distance, across - dot(at, view.forward));
   }
@@ -81,7 +84,7 @@ runtime::Background chooseBackground(const RenderRequest& request, bool burning,
 }
 
 runtime::Look chooseLook(const LookRequest& wanted, runtime::Look look, bool burning, bool ambientGiven) {
-  if (!ambientGiven) look.ambient = burning ? Triple{0.05f, 0.06f, 0.08f} : Triple{0.16f, 0.20f, 0.26f};
+  if (!ambientGiven) look.ambient = burning ? Triple{0.05f, 0.06f, 0.08f} : Triple{0.07f, 0.10f, 0.14f};
   look.extinctionScale = wanted.extinctionScale.value_or(look.extinctionScale) * wanted.density;
   look.emissionScale = wanted.emissionScale.value_or(look.emissionScale) * wanted.fire;
   look.anisotropy = wanted.anisotropy.value_or(look.anisotropy);
@@ -126,7 +129,7 @@ runtime::DrawInfo setUp(const RenderRequest& request, const format::Pack& pack, 
   draw.sun = chooseSun(request, up, burning);
   draw.background = chooseBackground(request, burning, opaque);
   draw.quality.filter = request.filter;
-  draw.quality.shadows = request.shadows ? request.filter : runtime::Filter::none;
+  draw.quality.shadows = request.shadows;
   draw.quality.step = request.step;
   draw.quality.jitter = true;
   return draw;

@@ -11,9 +11,9 @@ namespace billow::runtime {
 namespace {
 
 // Chosen by eye on smoke, dust, fire and explosions of several tools.
-constexpr double kSmokeDepth = 9;          // optical depth of the whole cloud, were it a cube of its densest gas
+constexpr double kSmokeDepth = 11;         // optical depth of the whole cloud, were it a cube of its densest gas
 constexpr double kDerivedSmokeDepth = 4;   // the same where smoke comes from temperature
-constexpr double kFireRadiance = 9;        // of the whole fire, were it a cube of its brightest gas
+constexpr double kFireRadiance = 3.5;       // of the whole fire, were it a cube of its brightest gas
 constexpr float kHottest = 2100;           // kelvin at the largest temperature of the volume
 constexpr float kColdest = 600;            // kelvin at 0
 
