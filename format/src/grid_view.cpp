@@ -115,7 +115,9 @@ struct GridLoader {
       sink.report(Rule::pageListRange, framePlace(), fmt::format("{} entries at {} of {}.", count, begin, entries));
       return false;
     }
-    for (const std::uint32_t number : pack.pageLists().subspan(begin, count)) {
+    const std::span<const std::uint32_t> list = pack.pageLists().subspan(begin, count);
+    if (!checkListedBytes(pack.pages(), list, framePlace(), sink)) return false;
+    for (const std::uint32_t number : list) {
       Page page;
       if (!loadPage(pack, number, page, sink) || !checkPageItems(pack, totals, page, sink)) return false;
       view.pages_.push_back(std::move(page));

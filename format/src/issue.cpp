@@ -26,6 +26,8 @@ constexpr IssueKind kCatalogue[] = {
     error(Rule::tooManyBricks, "too-many-bricks",
           "A grid frame spreads its shared nodes over no more bricks than this reader lays out at once."),
     error(Rule::tableLimit, "table-limit", "A table is no longer than this reader holds in memory (1 GiB)."),
+    error(Rule::frameLimit, "frame-limit",
+          "The pages of a grid frame are no more than this reader holds in memory (4 GiB)."),
 
     error(Rule::tooShort, "too-short", "A pack is at least as long as its header."),
     error(Rule::magic, "magic", "A pack begins with the magic bytes."),

@@ -164,6 +164,16 @@ class ItemRules {
 
 }  // namespace
 
+bool checkListedBytes(std::span<const PageRecord> pages, std::span<const std::uint32_t> list, const Place& place,
+                      IssueSink& sink) {
+  constexpr std::uint64_t kMost = std::uint64_t{1} << 32;
+  std::uint64_t bytes = 0;
+  for (const std::uint32_t page : list) bytes += page < pages.size() ? pages[page].rawSize : 0;
+  if (bytes <= kMost) return true;
+  sink.report(Rule::frameLimit, place, fmt::format("Its {} pages unpack to {} bytes.", list.size(), bytes));
+  return false;
+}
+
 bool loadPage(const Pack& pack, std::uint32_t number, Page& page, IssueSink& sink) {
   if (number >= pack.pages().size()) {
     sink.report(Rule::pageListPage, {}, fmt::format("Page {} of {}.", number, pack.pages().size()));

@@ -15,16 +15,19 @@
 
 namespace billow::format {
 
-// Calls work(i) for each i < count on up to `threads` threads (this one among them), and use(result) for each result by
-// ascending i, never two at once; ends early when use() returns false. At most four results a thread wait for their
-// turn. Rethrows what work() or use() threw.
 template <class T>
 class OrderedWork {
  public:
   OrderedWork(std::size_t count, unsigned threads, std::function<T(std::size_t)> work, std::function<bool(T)> use)
-      : count_(count), work_(std::move(work)), use_(std::move(use)), waiting_(std::size_t{4} * std::max(threads, 1u)) {
+      : count_(count),
+        work_(std::move(work)),
+        use_(std::move(use)),
+        threads_(std::max(threads, 1u)),
+        waiting_(4 * threads_) {}
+
+  void runAll() {
     std::vector<std::thread> others;
-    const std::size_t most = std::min<std::size_t>(std::max(threads, 1u), count);
+    const std::size_t most = std::min(threads_, count_);
     for (std::size_t i = 1; i < most; ++i) others.emplace_back([this] { run(); });
     run();
     for (std::thread& thread : others) thread.join();
@@ -74,6 +77,7 @@ class OrderedWork {
   const std::size_t count_;
   const std::function<T(std::size_t)> work_;
   const std::function<bool(T)> use_;
+  const std::size_t threads_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<std::optional<T>> waiting_;  // by index, modulo its size
@@ -82,6 +86,14 @@ class OrderedWork {
   bool ended_ = false;
   std::exception_ptr failure_;
 };
+
+// Calls work(i) for each i < count on up to `threads` threads (this one among them), and use(result) for each result by
+// ascending i, never two at once; ends early when use() returns false. At most four results a thread wait for their
+// turn. Rethrows what work() or use() threw.
+template <class T, class Work, class Use>
+void workInOrder(std::size_t count, unsigned threads, const Work& work, const Use& use) {
+  OrderedWork<T>(count, threads, work, use).runAll();
+}
 
 }  // namespace billow::format
 

@@ -16,20 +16,20 @@ constexpr std::uint64_t kMostPadding = 4096;
 constexpr std::size_t kPiece = std::size_t{1} << 20;
 
 struct SectionKind {
-  std::uint32_t type;
   std::string_view name;
+  std::uint32_t type;
   std::uint32_t flags;
 };
 constexpr SectionKind kSectionKinds[] = {
-    {kSectionPages, "PAGE", kSectionRequired},
-    {kSectionStrings, "STRS", kSectionRequired},
-    {kSectionVolumes, "VOLS", kSectionRequired},
-    {kSectionGrids, "GRDS", kSectionRequired},
-    {kSectionFrames, "FRMS", kSectionRequired},
-    {kSectionGridFrames, "GFRM", kSectionRequired},
-    {kSectionPageLists, "PLST", kSectionRequired},
-    {kSectionPageTable, "PDIR", kSectionRequired},
-    {kSectionInfo, "INFO", 0},
+    {"PAGE", kSectionPages, kSectionRequired},
+    {"STRS", kSectionStrings, kSectionRequired},
+    {"VOLS", kSectionVolumes, kSectionRequired},
+    {"GRDS", kSectionGrids, kSectionRequired},
+    {"FRMS", kSectionFrames, kSectionRequired},
+    {"GFRM", kSectionGridFrames, kSectionRequired},
+    {"PLST", kSectionPageLists, kSectionRequired},
+    {"PDIR", kSectionPageTable, kSectionRequired},
+    {"INFO", kSectionInfo, 0},
 };
 
 const SectionKind* kindOfSection(std::uint32_t type) {

@@ -28,6 +28,7 @@ enum class Rule : std::uint16_t {
   cannotRead = 2,
   tooManyBricks = 3,
   tableLimit = 4,
+  frameLimit = 5,
 
   tooShort = 101,
   magic = 102,
@@ -207,6 +208,11 @@ struct StreamTotals {
   std::uint64_t count[kStreamCount] = {};
 };
 StreamTotals streamTotals(std::span<const PageRecord> pages);
+
+// Whether the pages of a list are no more than this reader holds at once: they compress so well that a small file could
+// ask for terabytes.
+bool checkListedBytes(std::span<const PageRecord> pages, std::span<const std::uint32_t> list, const Place& place,
+                      IssueSink& sink);
 
 // ---- Pages (page_rules.cpp): stored bytes, then each item by itself.
 // Reads, verifies and decompresses; false when there is no content to look at.

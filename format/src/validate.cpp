@@ -140,7 +140,10 @@ class Validation {
     if (tablesSound) {
       gridFrames_ = static_cast<std::uint32_t>(pack_.gridFrames().size());
       for (std::uint32_t i = 0; i < gridFrames_; ++i) {
-        for (const std::uint32_t page : pack_.pagesOf(pack_.gridFrames()[i])) owner_[page] = std::min(owner_[page], i);
+        const std::span<const std::uint32_t> list = pack_.pagesOf(pack_.gridFrames()[i]);
+        FirstError tooLarge;  // reported in its turn; its pages are then looked at alone
+        if (!checkListedBytes(pack_.pages(), list, {}, tooLarge)) continue;
+        for (const std::uint32_t page : list) owner_[page] = std::min(owner_[page], i);
       }
     }
     for (std::uint32_t p = 0; p < owner_.size(); ++p) {
@@ -160,7 +163,7 @@ class Validation {
       }
       return std::move(found.issues());
     };
-    OrderedWork<Issues>(sections_.size() + gridFrames_ + loosePages_.size(), threads_, work,
+    workInOrder<Issues>(sections_.size() + gridFrames_ + loosePages_.size(), threads_, work,
                         [&](Issues issues) { return keep(std::move(issues)); });
   }
 
@@ -171,9 +174,11 @@ class Validation {
 
   void checkGridFrame(std::uint32_t index, IssueSink& sink) {
     const GridFrame& frame = pack_.gridFrames()[index];
+    const std::span<const std::uint32_t> list = pack_.pagesOf(frame);
+    const Place place = PackReader::view(pack_).gridFramePlace(index);
     std::vector<Page> pages;
-    if (!loadPages(index, pack_.pagesOf(frame), pages, sink)) return;
-    GridWalk walk(pack_, totals_, frame, PackReader::view(pack_).gridFramePlace(index), pages, sink);
+    if (!checkListedBytes(pack_.pages(), list, place, sink) || !loadPages(index, list, pages, sink)) return;
+    GridWalk walk(pack_, totals_, frame, place, pages, sink);
     if (walk.check()) usage_->add(walk, pages);
   }
 
@@ -207,7 +212,7 @@ class Validation {
     pages.reserve(numbers.size());
     // Threads that whole grid frames leave idle.
     const unsigned threads = threads_ / std::max(1u, std::min(threads_, gridFrames_));
-    OrderedWork<Loaded>(numbers.size(), threads, load, use);
+    workInOrder<Loaded>(numbers.size(), threads, load, use);
     return sound && !sink.stopped();
   }
 

@@ -1,6 +1,8 @@
 // Whole packs: written, opened, walked; deterministic, and gone without trace when they fail.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -178,6 +180,43 @@ TEST(Pack, RefusedPathsAreNamed) {
     }
   }
   EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+}
+
+// A file size limit fails like a full disk: some write is refused.
+TEST(Pack, RefusedWritesThrowAndLeaveNothing) {
+  const TempFolder folder;
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  for (const rlim_t limit : {rlim_t{0}, rlim_t{100}, rlim_t{70000}}) {
+    const rlimit small{limit, before.rlim_max};
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+    bool refused = false;
+    try {
+      PackWriter writer(folder / "a.blw", {});
+      for (std::uint32_t i = 0; i < 40; ++i) writer.append(Stream::unit, tests::randomBytes(12800, i).data(), 100);
+      writer.finish({});
+    } catch (const std::system_error& error) {
+      refused = std::string(error.what()).find(folder / "a.blw") != std::string::npos;
+    }
+    setrlimit(RLIMIT_FSIZE, &before);
+    EXPECT_TRUE(refused) << limit;
+    EXPECT_TRUE(folder.empty()) << limit;
+  }
+  std::signal(SIGXFSZ, handler);
+}
+
+TEST(Pack, FinishedFileReplacesTheOld) {
+  const TempFolder folder;
+  for (const std::uint32_t frames : {1u, 3u}) {
+    PackWriter writer(folder / "a.blw", {});
+    PackTables tables = tests::sampleTables("v", {"density"}, frames);
+    tables.gridFrames.assign(frames, tests::absentGridFrame());
+    writer.finish(tables);
+    const Result<Pack> pack = Pack::openFile(folder / "a.blw");
+    ASSERT_TRUE(pack) << toString(pack.error());
+    EXPECT_EQ(pack->frames().size(), frames);
+  }
 }
 
 TEST(Pack, UnreadablePathsAreIoIssues) {

@@ -436,6 +436,43 @@ TEST(Rules, Constants) {
   expectIssue(605, [](PackImage& i) { i.gridFrames[0].valueMax = 1; });
 }
 
+// A page of zeros takes few bytes: many of them would fill the memory if a grid frame could have them all at once.
+TEST(Limits, EndlessPagesAreRefused) {
+  const std::vector<std::uint32_t> zeros(kMaxPageBytes / 4);
+  const std::vector<std::byte> bytes = tests::writePack({}, [&](PackWriter& writer) {
+    PackTables tables = tests::sampleTables("bomb", {"density"}, 1);
+    const auto node5 = std::make_unique<Node5>();
+    GridFrame frame = tests::absentGridFrame();
+    frame.flags = kGridPresent;
+    frame.node5 = writer.append(Stream::node5, node5.get(), 1);
+    writer.append(Stream::child, zeros.data(), kMaxPageBytes / 4);
+    tables.pageLists = {0, 1};
+    frame.pageListCount = 2;
+    tables.gridFrames.push_back(frame);
+    return tables;
+  });
+  EXPECT_EQ(idsOf(bytes), std::multiset<int>{305});
+  PackImage image = PackImage::of(bytes);
+  const auto pages = getAt<SectionEntry>(bytes, sizeof(FileHeader));
+  std::vector<PageRecord> records;
+  std::vector<std::byte> content;
+  const Pack pack = *Pack::open(makeMemorySource(bytes));
+  for (std::uint32_t i = 0; i < 4100; ++i) {
+    PageRecord record = pack.pages()[std::min(i, 1u)];
+    const auto stored = std::span(bytes).subspan(pages.offset + record.offset, record.storedSize);
+    record.offset = content.size();
+    if (i > 0) record.streams[5].first = (i - 1) * (kMaxPageBytes / 4);
+    content.insert(content.end(), stored.begin(), stored.end());
+    records.push_back(record);
+    if (i > 1) image.pageLists.push_back(i);
+  }
+  image.gridFrames[0].pageListCount = 4100;
+  const std::vector<std::byte> bomb = image.assemble(content, records);
+  EXPECT_LT(bomb.size(), kMaxPageBytes);
+  EXPECT_EQ(loaderStop(bomb), 5);
+  EXPECT_EQ(idsOf(bomb), std::multiset<int>{5});
+}
+
 // Shared nodes make few bytes stand for many bricks: sound, but more than a view lays out.
 TEST(Limits, TooManyBricksAreRefusedByTheViewAlone) {
   const std::vector<std::byte> bytes = tests::writePack({}, [](PackWriter& writer) {

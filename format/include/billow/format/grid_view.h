@@ -15,7 +15,8 @@ namespace billow::format {
 class GridView {
  public:
   // Loads the pages that `gridFrame` lists and checks every node and brick that is reachable. A frame whose shared
-  // nodes stand for more than 2^24 bricks is refused (too-many-bricks).
+  // nodes stand for more than 2^24 bricks, or whose pages hold more than 4 GiB, is refused (too-many-bricks,
+  // frame-limit). Listed page numbers must be those of the pack's own tables.
   static Result<GridView> load(const Pack& pack, const GridFrame& gridFrame);
 
   const GridFrame& frame() const { return frame_; }
