@@ -173,7 +173,7 @@ void addCompare(CLI::App& app, Run& run) {
   command->add_flag("--json", arguments->json, "Print the figures as one JSON object");
   command->footer(
       "PSNR is 20 log10((max - min) / RMSE) over active voxels; max and min are the source's, background included.\n"
-      "Exit code 3 when a frame, a grid or an active voxel of the source is not in the pack, or the reverse.\n"
+      "Exit code 3 when a frame or a grid of the source is not in the pack, or a voxel is active in one of them only.\n"
       "Example: billow compare fire.blw 'fire_####.vdb'");
   command->callback([arguments, &run] { run = [arguments] { return runCompare(*arguments); }; });
 }

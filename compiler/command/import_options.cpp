@@ -4,6 +4,8 @@
 
 #include <charconv>
 #include <cstdio>
+#include <mutex>
+#include <set>
 #include <string_view>
 
 namespace billow::command {
@@ -73,6 +75,10 @@ compiler::ImportOptions importOptions(const ImportArguments& arguments) {
 }
 
 void printWarning(const std::string& text) {
+  static std::mutex mutex;
+  static std::set<std::string> said;
+  const std::lock_guard lock(mutex);
+  if (!said.insert(text).second) return;
   fmt::print(stderr, "billow: warning: {}\n", text);
 }
 

@@ -22,7 +22,7 @@ void addImportOptions(CLI::App& command, ImportArguments& arguments);
 // Throws compiler::Error(commandLine) where a text cannot be understood.
 compiler::ImportOptions importOptions(const ImportArguments& arguments);
 
-// "billow: warning: ..." on stderr; may be called from any thread.
+// "billow: warning: ..." on stderr, the same text once; may be called from any thread.
 void printWarning(const std::string& text);
 
 }  // namespace billow::command

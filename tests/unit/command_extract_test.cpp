@@ -150,6 +150,19 @@ TEST_F(Extract, CompareMeetsWhatCompileWasAsked) {
   }
 }
 
+TEST_F(Extract, TellsVolumesApart) {
+  std::ofstream(folder_ / "m.json") << R"({"volumes": [{"name": "one", "inputs": ["s_#.vdb"], "frames": "4"},
+      {"name": "two", "inputs": ["s_#.vdb"], "grids": [{"name": "warmth", "source": "heat", "role": "temperature"}]}]})";
+  const std::string manifest = folder_ / "m.json", two = folder_ / "two.blw", output = folder_ / "x.vdb";
+  run("compile '" + manifest + "' -o '" + two + "'", 0);
+  const auto report = nlohmann::json::parse(run("compare '" + two + "' '" + manifest + "' --json", 0).out);
+  EXPECT_EQ(report.at("grids").size(), 7u);
+  EXPECT_NE(run("extract '" + two + "' --frame 4 -o '" + output + "'", 1).err.find("one, two"), std::string::npos);
+  run("extract '" + two + "' --volume one --frame 5 -o '" + output + "'", 1);
+  run("extract '" + two + "' --volume two --frame 5 -o '" + output + "'", 0);
+  EXPECT_EQ(importFile(output).first.grids.at(0).name, "warmth");
+}
+
 // One voxel more, one grid more, one frame more, another background: each is exit code 3.
 TEST_F(Extract, CompareFindsEveryDifference) {
   const auto compareWith = [&](const ImportedGrid& density, const std::string& name, const std::string& file) {

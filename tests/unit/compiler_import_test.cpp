@@ -103,6 +103,8 @@ TEST(PlanFrames, AreFoundByNumberHoweverTheyAreGiven) {
   EXPECT_EQ(numbersOf(plan({folder / "a_%02d.vdb"})), Numbers{10});
   EXPECT_EQ(numbersOf(plan({folder / "a_9.vdb"})), Numbers{9});
   EXPECT_EQ(plan({folder.path().string()}).volumes[0].name, "a");
+  std::ofstream(folder / "._a_9.vdb") << "a Mac's";
+  EXPECT_EQ(numbersOf(plan({folder.path().string()})), expected);
 }
 
 TEST(PlanFrames, PatternTakesTheNumberAtItsPlace) {

@@ -29,7 +29,7 @@ struct Imported {
   }
 };
 
-Imported import(const openvdb::GridPtrVec& grids, const ImportOptions& options = {}) {
+Imported importGrids(const openvdb::GridPtrVec& grids, const ImportOptions& options = {}) {
   openvdb::initialize();
   const TempFolder folder;
   openvdb::io::File file(folder / "a.vdb");
@@ -80,9 +80,10 @@ openvdb::GridBase::Ptr oneValue(const std::string& name, const typename GridT::V
 }
 
 TEST(ImportTypes, EveryScalarTypeBecomesFloat) {
-  const Imported imported = import({oneValue<openvdb::FloatGrid>("f", 0.5f), oneValue<openvdb::DoubleGrid>("d", 0.1),
-                                    oneValue<openvdb::Int32Grid>("i", -7), oneValue<openvdb::Int64Grid>("l", 1ll << 40),
-                                    oneValue<openvdb::BoolGrid>("b", true), oneValue<openvdb::MaskGrid>("m", true)});
+  const Imported imported =
+      importGrids({oneValue<openvdb::FloatGrid>("f", 0.5f), oneValue<openvdb::DoubleGrid>("d", 0.1),
+                   oneValue<openvdb::Int32Grid>("i", -7), oneValue<openvdb::Int64Grid>("l", 1ll << 40),
+                   oneValue<openvdb::BoolGrid>("b", true), oneValue<openvdb::MaskGrid>("m", true)});
   const std::pair<const char*, float> expected[] = {{"f", 0.5f},    {"d", 0.1f}, {"i", -7},
                                                     {"l", 0x1p40f}, {"b", 1},    {"m", 1}};
   for (const auto& [name, value] : expected) {
@@ -99,8 +100,8 @@ TEST(ImportTypes, EveryScalarTypeBecomesFloat) {
 
 TEST(ImportTypes, EveryVectorTypeBecomesThreeGrids) {
   const Imported imported =
-      import({oneValue<openvdb::Vec3SGrid>("s", {1, -2, 3}), oneValue<openvdb::Vec3DGrid>("d", {1, -2, 3}),
-              oneValue<openvdb::Vec3IGrid>("i", {1, -2, 3})});
+      importGrids({oneValue<openvdb::Vec3SGrid>("s", {1, -2, 3}), oneValue<openvdb::Vec3DGrid>("d", {1, -2, 3}),
+                   oneValue<openvdb::Vec3IGrid>("i", {1, -2, 3})});
   for (const char* name : {"s", "d", "i"}) {
     EXPECT_EQ(activeAt(imported.grid(std::string(name) + ".x"), kAt), 1) << name;
     EXPECT_EQ(activeAt(imported.grid(std::string(name) + ".y"), kAt), -2) << name;
@@ -115,7 +116,7 @@ TEST(ImportTypes, HalfIsReadAndNamed) {
   auto vector = makeGrid<openvdb::Vec3SGrid>("v");
   vector->tree().setValueOn(kAt, openvdb::Vec3s(1, 2, -0.5f));
   vector->setSaveFloatAsHalf(true);
-  const Imported imported = import({scalar, vector});
+  const Imported imported = importGrids({scalar, vector});
   EXPECT_EQ(activeAt(imported.grid("f"), kAt), 0.25f);
   EXPECT_EQ(activeAt(imported.grid("v.z"), kAt), -0.5f);
   EXPECT_EQ(imported.plan.volumes[0].grids[0].sourceType, format::SourceType::float16);
@@ -124,7 +125,7 @@ TEST(ImportTypes, HalfIsReadAndNamed) {
 TEST(ImportTypes, UnsupportedGridsAreNamedAndSkipped) {
   auto points = openvdb::points::PointDataGrid::create();
   points->setName("points");
-  const Imported imported = import({points, oneValue<openvdb::FloatGrid>("density", 1)});
+  const Imported imported = importGrids({points, oneValue<openvdb::FloatGrid>("density", 1)});
   ASSERT_EQ(imported.warnings.size(), 1u);
   EXPECT_NE(imported.warnings[0].find("'points'"), std::string::npos);
   EXPECT_EQ(activeAt(imported.grid("density"), kAt), 1);
@@ -136,7 +137,7 @@ TEST(ImportTrees, TilesStayTilesAtEveryLevel) {
   grid->tree().addTile(2, Coord(-128, 0, 0), 2, true);
   grid->tree().addTile(1, Coord(8, 0, 0), 1, true);
   grid->tree().addTile(2, Coord(-256, 0, 0), 9, false);  // inactive: not there
-  const Imported imported = import({grid});
+  const Imported imported = importGrids({grid});
   const ImportedGrid& result = imported.grid("density");
   ASSERT_EQ(result.tiles.size(), 3u) << imported.error;
   EXPECT_EQ(result.tiles[0].dim, 128u);
@@ -154,7 +155,7 @@ TEST(ImportTrees, LeavesAreSortedAndInactiveValuesAreTheBackground) {
     grid->tree().setValueOff(at + Coord(0, 0, 1), 77);
   }
   grid->tree().setValueOff(Coord(0, 0, 500), 1);  // a leaf without an active voxel
-  const Imported imported = import({grid});
+  const Imported imported = importGrids({grid});
   const ImportedGrid& result = imported.grid("density");
   ASSERT_EQ(result.leaves.size(), 4u);
   for (std::size_t i = 1; i < 4; ++i) EXPECT_LT(result.leaves[i - 1].origin, result.leaves[i].origin);
@@ -174,7 +175,7 @@ TEST(ImportTrees, InstancesShareTheirTree) {
   const openvdb::FloatGrid::Ptr second = openvdb::FloatGrid::create(first->treePtr());
   second->setName("b");
   second->setTransform(openvdb::math::Transform::createLinearTransform(0.5));
-  const Imported imported = import({first, second});
+  const Imported imported = importGrids({first, second});
   EXPECT_EQ(activeAt(imported.grid("a"), kAt), 4) << imported.error;
   EXPECT_EQ(activeAt(imported.grid("b"), kAt), 4);
   EXPECT_EQ(imported.grid("a").indexToWorld[0], 1);
@@ -189,7 +190,7 @@ TEST(ImportTransform, AnyAffineOneIsTaken) {
   transform->preShear(0.2, openvdb::math::X_AXIS, openvdb::math::Y_AXIS);
   transform->postTranslate(openvdb::Vec3d(1, 2, 3));
   grid->setTransform(transform);
-  const Imported imported = import({grid});
+  const Imported imported = importGrids({grid});
   const auto& m = imported.grid("density").indexToWorld;
   const openvdb::Vec3d index(3, -4, 5), world = transform->indexToWorld(index);
   for (std::size_t row = 0; row < 3; ++row) {
@@ -203,7 +204,7 @@ TEST(ImportTransform, FrustumIsRefused) {
   grid->tree().setValueOn(Coord(1, 1, 1), 1);
   grid->setTransform(
       openvdb::math::Transform::createFrustumTransform(openvdb::BBoxd({0, 0, 0}, {10, 10, 10}), 0.5, 10));
-  EXPECT_NE(import({grid}).error.find("frustum"), std::string::npos);
+  EXPECT_NE(importGrids({grid}).error.find("frustum"), std::string::npos);
 }
 
 TEST(ImportValues, NonFiniteOnesAreFoundWhereTheyCount) {
@@ -213,13 +214,13 @@ TEST(ImportValues, NonFiniteOnesAreFoundWhereTheyCount) {
   grid->tree().setValueOn(Coord(10, 0, 3), nan);
   grid->tree().setValueOn(Coord(10, 0, 4), 2);
   grid->tree().setValueOff(Coord(0, 0, 0), nan);  // inactive: nobody's
-  const std::string error = import({grid}).error;
+  const std::string error = importGrids({grid}).error;
   for (const char* text : {"a.vdb", "frame 0", "'density'", "2 active", "(10, 0, 3)", "nan", "--non-finite zero"}) {
     EXPECT_NE(error.find(text), std::string::npos) << text << "\n" << error;
   }
   ImportOptions options;
   options.nonFinite = NonFinite::zero;
-  const Imported zeroed = import({grid}, options);
+  const Imported zeroed = importGrids({grid}, options);
   EXPECT_EQ(activeAt(zeroed.grid("density"), Coord(10, 0, 3)), 0);
   EXPECT_EQ(activeAt(zeroed.grid("density"), Coord(10, 0, 4)), 2);
   EXPECT_EQ(zeroed.grid("density").max, 2);
@@ -229,23 +230,23 @@ TEST(ImportValues, NonFiniteTilesAndBackgroundsAreFound) {
   const float infinity = std::numeric_limits<float>::infinity();
   auto tile = makeGrid<openvdb::FloatGrid>("density");
   tile->tree().addTile(2, Coord(128, 0, 0), infinity, true);
-  EXPECT_NE(import({tile}).error.find("(128, 0, 0)"), std::string::npos);
+  EXPECT_NE(importGrids({tile}).error.find("(128, 0, 0)"), std::string::npos);
   auto background = makeGrid<openvdb::FloatGrid>("density", infinity);
-  EXPECT_NE(import({background}).error.find("background"), std::string::npos);
+  EXPECT_NE(importGrids({background}).error.find("background"), std::string::npos);
 }
 
 TEST(ImportValues, TooLargeForFloatSkipsTheGrid) {
   const Imported imported =
-      import({oneValue<openvdb::DoubleGrid>("big", -1e38), oneValue<openvdb::FloatGrid>("density", 1)});
+      importGrids({oneValue<openvdb::DoubleGrid>("big", -1e38), oneValue<openvdb::FloatGrid>("density", 1)});
   EXPECT_FALSE(imported.grid("big").present);
   EXPECT_TRUE(imported.grid("density").present);
   ASSERT_EQ(imported.warnings.size(), 1u);
   EXPECT_NE(imported.warnings[0].find("-1e+38"), std::string::npos) << imported.warnings[0];
-  EXPECT_NE(import({oneValue<openvdb::DoubleGrid>("big", 1e300)}).error.find("no grids"), std::string::npos);
+  EXPECT_NE(importGrids({oneValue<openvdb::DoubleGrid>("big", 1e300)}).error.find("no grids"), std::string::npos);
 }
 
 TEST(ImportValues, DenormalsBecomeZeroWithAWarning) {
-  const Imported imported = import({oneValue<openvdb::FloatGrid>("density", 1e-40f)});
+  const Imported imported = importGrids({oneValue<openvdb::FloatGrid>("density", 1e-40f)});
   EXPECT_EQ(activeAt(imported.grid("density"), kAt), 0);
   EXPECT_EQ(imported.warnings.size(), 1u);
 }
@@ -254,10 +255,10 @@ TEST(ImportLevelSets, AreRefusedOrConverted) {
   openvdb::initialize();
   auto sphere = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(20, openvdb::Vec3f(0), 1);
   sphere->setName("surface");
-  EXPECT_NE(import({sphere}).error.find("--sdf-to-fog"), std::string::npos);
+  EXPECT_NE(importGrids({sphere}).error.find("--sdf-to-fog"), std::string::npos);
   ImportOptions options;
   options.sdfToFog = true;
-  const Imported fog = import({sphere}, options);
+  const Imported fog = importGrids({sphere}, options);
   const ImportedGrid& grid = fog.grid("surface");
   EXPECT_EQ(activeAt(grid, Coord(0, 0, 0)), 1);
   EXPECT_EQ(activeAt(grid, Coord(40, 0, 0)), std::nullopt);

@@ -113,7 +113,8 @@ std::vector<FoundFile> expandPattern(const std::string& input, const Pattern& pa
 std::vector<FoundFile> expandDirectory(const std::string& input) {
   std::vector<FoundFile> found;
   forEachFile(input, [&](const fs::path& path) {
-    if (isVdb(path)) found.push_back(describe(path.string()));
+    const bool hidden = path.filename().string().starts_with('.');  // "._smoke_0001.vdb" is a Mac's, and no VDB
+    if (isVdb(path) && !hidden) found.push_back(describe(path.string()));
   });
   if (found.empty()) throw Error(Fault::file, fmt::format("{}: no .vdb file in this directory", input));
   return found;

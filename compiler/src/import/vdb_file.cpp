@@ -137,7 +137,7 @@ void setType(VdbGrid& grid, std::string tree) {
   grid.treeType = std::move(tree);
 }
 
-// Offsets of the grid, its blocks and its end, as the file has them.
+// Where a grid begins and ends. (Between them in the file stands where its buffers begin; nobody needs that to read.)
 struct Span {
   std::uint64_t grid, end;
 };
@@ -145,11 +145,9 @@ struct Span {
 Span readOffsets(ByteReader& reader, const VdbGrid& grid) {
   const std::uint64_t after = reader.position() + 24;
   const auto gridOffset = reader.value<std::uint64_t>("a grid's offset");
-  const auto blockOffset = reader.value<std::uint64_t>("a grid's offset");
+  reader.skip(8, "a grid's offset");
   const auto endOffset = reader.value<std::uint64_t>("a grid's offset");
-  const bool ordered = gridOffset >= after && gridOffset <= endOffset &&
-                       (!grid.instanceParent.empty() || (gridOffset <= blockOffset && blockOffset <= endOffset));
-  if (!ordered || endOffset > reader.size()) {
+  if (gridOffset < after || gridOffset > endOffset || endOffset > reader.size()) {
     reader.fail(
         fmt::format("grid '{}' lies at bytes {} to {} of a file of {} bytes (truncated, or its index is damaged)",
                     grid.uniqueName, gridOffset, endOffset, reader.size()));

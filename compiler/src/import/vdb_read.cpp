@@ -75,8 +75,8 @@ class TreeSource {
   using ValueT = typename TreeT::ValueType;
   using LeafT = typename TreeT::LeafNodeType;
 
-  TreeSource(const TreeT& tree, std::string what, const ReadContext& context)
-      : background_(tree.background()), what_(std::move(what)), context_(context) {
+  TreeSource(const TreeT& tree, std::string name, std::string what, const ReadContext& context)
+      : background_(tree.background()), name_(std::move(name)), what_(std::move(what)), context_(context) {
     collect(tree);
   }
 
@@ -224,6 +224,7 @@ class TreeSource {
   }
 
   ValueT background_;
+  std::string name_;
   std::string what_;  // file, frame and grid
   const ReadContext& context_;
   std::vector<const LeafT*> leaves_;
@@ -248,7 +249,7 @@ void levelSetToFog(GridT& grid, const std::string& what, const ReadContext& cont
   if constexpr (std::is_floating_point_v<typename GridT::ValueType>) {
     if (!(grid.background() > 0)) throw Error(Fault::input, what + ": a level set's background must be positive");
     ImportedGrid checked;  // NaN and infinity must be found before they are turned into densities
-    TreeSource(grid.tree(), what, context).convertTo(0, checked);
+    TreeSource(grid.tree(), grid.getName(), what, context).convertTo(0, checked);
     openvdb::tools::sdfToFogVolume(grid);
   }
 }
@@ -279,7 +280,7 @@ void readAs(const openvdb::GridBase::Ptr& base, const VdbGrid& info, const std::
   const auto grid = openvdbGrid<GridT>(base, what);
   const auto matrix = matrixOf(grid->transform(), what);
   if (isLevelSet(info)) levelSetToFog(*grid, what, context);
-  const TreeSource source(grid->tree(), what, context);
+  const TreeSource source(grid->tree(), info.name, what, context);
   for (std::uint32_t component = 0; component < 3; ++component) {
     ImportedGrid* target = out[component];
     if (target == nullptr) continue;
