@@ -131,7 +131,7 @@ runtime::DrawInfo setUp(const RenderRequest& request, const format::Pack& pack, 
   draw.quality.filter = request.filter;
   draw.quality.shadows = request.shadows;
   draw.quality.step = request.step;
-  draw.quality.jitter = true;
+  draw.quality.jitter = false;
   return draw;
 }
 

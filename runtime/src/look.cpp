@@ -12,10 +12,10 @@ namespace {
 
 // Chosen by eye on smoke, dust, fire and explosions of several tools.
 constexpr double kSmokeDepth = 11;         // optical depth of the whole cloud, were it a cube of its densest gas
-constexpr double kDerivedSmokeDepth = 4;   // the same where smoke comes from temperature
-constexpr double kFireRadiance = 3.5;       // of the whole fire, were it a cube of its brightest gas
-constexpr float kHottest = 2100;           // kelvin at the largest temperature of the volume
-constexpr float kColdest = 600;            // kelvin at 0
+constexpr double kDerivedSmokeDepth = 7;   // the same where smoke comes from temperature
+constexpr double kFireRadiance = 5.5;       // of the whole fire, were it a cube of its brightest gas
+constexpr float kHottest = 1800;           // kelvin at the largest temperature of the volume
+constexpr float kColdest = 300;            // kelvin at 0
 
 // How much gas a grid frame holds, weighted by itself, so that thin haze counts for little.
 struct Amount {
@@ -91,6 +91,7 @@ Result<void> fitHeat(const format::Pack& pack, const format::VolumeRecord& volum
   }
   const float hottest = largestValue(pack, volume, heat);
   look.heatMax = hottest > 0 ? hottest : 1;
+  look.albedo = {0.50f, 0.47f, 0.44f};  // soot
   look.temperatureOffset = kColdest;
   look.temperatureScale = (kHottest - kColdest) / look.heatMax;
   const std::uint32_t burning = grids.flames != format::kNone ? grids.flames : grids.temperature;
