@@ -61,18 +61,18 @@ struct GridParams {
 BILLOW_GPU_SIZE(GridParams, 160);
 
 struct MarchParams {
-  vec4 right;       // world, to the right edge at distance 1; w: radians a pixel spans at the centre
-  vec4 up;          // world, to the upper edge at distance 1; w: background opacity
-  vec4 forward;     // world, unit; w: march step in voxels
-  vec4 sun;         // unit vector to the sun; w: Henyey-Greenstein g
-  vec4 sunLight;    // irradiance at normal incidence, linear RGB; w: scattering orders to imitate, at least 1
-  vec4 ambient;     // in-scattered radiance; w: extinction per world unit and grid value
-  vec4 albedo;      // w: shadow step in voxels
-  vec4 emission;    // radiance per world unit and unit of emission, kelvin a grid value, kelvin at 0, reference kelvin
-  vec4 smoke;       // derived smoke: 1 / largest value, rise begin, rise end, share that is left in the hottest part
+  vec4 right;     // world, to the right edge at distance 1; w: radians a pixel spans at the centre
+  vec4 up;        // world, to the upper edge at distance 1; w: background opacity
+  vec4 forward;   // world, unit; w: march step in voxels
+  vec4 sun;       // unit vector to the sun; w: Henyey-Greenstein g
+  vec4 sunLight;  // irradiance at normal incidence, linear RGB; w: scattering orders to imitate, at least 1
+  vec4 ambient;   // in-scattered radiance; w: extinction per world unit and grid value
+  vec4 albedo;    // w: shadow step in voxels
+  vec4 emission;  // radiance per world unit and unit of emission, kelvin a grid value, kelvin at 0, reference kelvin
+  vec4 smoke;     // derived smoke: 1 / largest value, rise begin, rise end, share that is left in the hottest part
   vec4 background[2];  // linear RGB at the picture's bottom and top
-  uvec4 size;       // width, height, shadow steps at most, jitter (0 or 1)
-  uvec4 atlas;      // log2 of slots along x | along y << 8, for BC7, BC4, R8
+  uvec4 size;          // width, height, shadow steps at most, jitter (0 or 1)
+  uvec4 atlas;         // log2 of slots along x | along y << 8, for BC7, BC4, R8
   GridParams grids[3];
 };
 BILLOW_GPU_SIZE(MarchParams, 13 * 16 + 3 * 160);

@@ -33,7 +33,9 @@ int complain(const Refusal& refusal) {
   return refusal.code;
 }
 
-tl::unexpected<Refusal> refuse(int code, const std::string& message) { return tl::unexpected(Refusal{code, message}); }
+tl::unexpected<Refusal> refuse(int code, const std::string& message) {
+  return tl::unexpected(Refusal{code, message});
+}
 
 // Runtime errors as the command's: what is wrong with the pack is the pack's fault, all else the GPU's.
 Refusal toRefusal(const runtime::Error& error, const std::string& pack) {
@@ -108,12 +110,13 @@ void applyNumbers(const Arguments& arguments, RenderRequest& request) {
 
 Checked<RenderRequest> makeRequest(const Arguments& arguments) {
   if (arguments.method != "direct") {
-    return refuse(kCommandLine, fmt::format("--method is \"{}\"; this version draws by \"direct\" alone",
-                                            arguments.method));
+    return refuse(kCommandLine,
+                  fmt::format("--method is \"{}\"; this version draws by \"direct\" alone", arguments.method));
   }
   const std::string extension = std::filesystem::path(arguments.output).extension().string();
   if (extension != ".png" && extension != ".exr") {
-    return refuse(kCommandLine, fmt::format("-o is \"{}\"; expected a name that ends in .png or .exr", arguments.output));
+    return refuse(kCommandLine,
+                  fmt::format("-o is \"{}\"; expected a name that ends in .png or .exr", arguments.output));
   }
   RenderRequest request;
   if (std::filesystem::path(arguments.input).extension() == ".json") {
@@ -198,8 +201,8 @@ struct Job {
   const format::VolumeRecord& record() const { return pack.volumes()[volume]; }
 };
 
-Checked<void> renderFrame(const Job& job, headless::Headless& gpu, runtime::Renderer& renderer,
-                          runtime::DrawInfo draw, std::uint32_t index) {
+Checked<void> renderFrame(const Job& job, headless::Headless& gpu, runtime::Renderer& renderer, runtime::DrawInfo draw,
+                          std::uint32_t index) {
   const auto frame = renderer.upload(job.pack, job.volume, index, {.grids = job.grids});
   if (!frame) return tl::unexpected(toRefusal(frame.error(), job.request.pack));
   draw.frame = frame->get();
@@ -216,8 +219,7 @@ Checked<void> renderAll(const Job& job) {
   if (!look) return tl::unexpected(toRefusal(look.error(), job.request.pack));
   // The camera frames the whole sequence, so that a frame alone and within a range are the same picture.
   const std::uint32_t lastFrame = job.record().frameCount - 1;
-  const runtime::DrawInfo draw =
-      setUp(job.request, job.pack, job.record(), job.grids, *look, 0, lastFrame, job.png);
+  const runtime::DrawInfo draw = setUp(job.request, job.pack, job.record(), job.grids, *look, 0, lastFrame, job.png);
   const auto gpu = headless::Headless::create({.device = job.request.device});
   if (!gpu) return tl::unexpected(toRefusal(gpu.error(), job.request.pack));
   const auto renderer = runtime::Renderer::create((*gpu)->host(), {.gpuBudget = job.request.gpuBudget});
@@ -225,8 +227,9 @@ Checked<void> renderAll(const Job& job) {
   const bool progress = job.frames.size() > 1 && isatty(STDERR_FILENO) != 0;
   for (std::size_t i = 0; i < job.frames.size(); ++i) {
     if (auto done = renderFrame(job, **gpu, **renderer, draw, job.frames[i]); !done) return done;
-    if (progress) fmt::print(stderr, "\r{}/{} frames on {}{}", i + 1, job.frames.size(), (*gpu)->deviceName(),
-                             i + 1 == job.frames.size() ? "\n" : "");
+    if (progress)
+      fmt::print(stderr, "\r{}/{} frames on {}{}", i + 1, job.frames.size(), (*gpu)->deviceName(),
+                 i + 1 == job.frames.size() ? "\n" : "");
   }
   return {};
 }
@@ -290,8 +293,9 @@ void addLightOptions(CLI::App& command, Arguments& arguments) {
   command.add_option("--temperature-offset", look.temperatureOffset, "Kelvin at grid value 0");
   command.add_option("--albedo", arguments.albedo, "Of smoke, r,g,b in [0, 1]");
   command.add_option("--anisotropy", look.anisotropy, "Henyey-Greenstein g of smoke")->check(CLI::Range(-0.99, 0.99));
-  command.add_option("--scattering-orders", look.scatteringOrders,
-                     "1: single scattering; more imitate multiple scattering (default 4)")
+  command
+      .add_option("--scattering-orders", look.scatteringOrders,
+                  "1: single scattering; more imitate multiple scattering (default 4)")
       ->check(CLI::Range(1, 8));
 }
 
@@ -318,14 +322,16 @@ void addRender(CLI::App& app, Run& run) {
       "Examples:\n"
       "  billow render fire.blw --frame 12 -o fire.png\n"
       "  billow render fire.blw --frame 5-12 -o fire.exr      writes fire_0005.exr to fire_0012.exr\n"
-      "Exit codes: 0 done, 1 command line, 2 a file cannot be read or written, 3 invalid pack or scene, 4 no usable GPU");
+      "Exit codes: 0 done, 1 command line, 2 a file cannot be read or written, 3 invalid pack or scene, 4 no usable "
+      "GPU");
   command->add_option("input", arguments->input, "A pack, or a scene (*.json, see spec/scene.schema.json)")
       ->required()
       ->type_name("PACK|SCENE.json");
   command->add_option("--frame", arguments->frames, "Frame number as the source counts, or a range N-M")
       ->required()
       ->type_name("N[-M]");
-  command->add_option("-o,--output", arguments->output, "Picture to write; of a range, _NUMBER goes before .png or .exr")
+  command
+      ->add_option("-o,--output", arguments->output, "Picture to write; of a range, _NUMBER goes before .png or .exr")
       ->required()
       ->type_name("OUT");
   addPictureOptions(*command, *arguments);

@@ -104,8 +104,8 @@ std::string encodeExr(const headless::Picture& picture) {
   }
   std::vector<float> depth = picture.depth;
   header.channels().insert("Z", Imf::Channel(Imf::FLOAT));
-  frameBuffer.insert("Z", Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(depth.data()), sizeof(float),
-                                     sizeof(float) * picture.width));
+  frameBuffer.insert(
+      "Z", Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(depth.data()), sizeof(float), sizeof(float) * picture.width));
   Imf::StdOSStream stream;
   {
     Imf::OutputFile file(stream, header);

@@ -71,10 +71,10 @@ struct RenderRequest {
 Checked<void> readScene(const std::string& path, RenderRequest& request);
 
 // The texts of options; each gives a sentence with what was expected where it cannot be read.
-Checked<void> parseFrames(const std::string& text, RenderRequest& request);         // N or N-M
-Checked<void> parseSize(const std::string& text, RenderRequest& request);           // WxH
-Checked<void> parseCamera(const std::string& text, RenderRequest& request);         // x,y,z:x,y,z[:degrees]
-Checked<void> parseBackground(const std::string& text, RenderRequest& request);     // none, r,g,b or r,g,b:r,g,b
+Checked<void> parseFrames(const std::string& text, RenderRequest& request);      // N or N-M
+Checked<void> parseSize(const std::string& text, RenderRequest& request);        // WxH
+Checked<void> parseCamera(const std::string& text, RenderRequest& request);      // x,y,z:x,y,z[:degrees]
+Checked<void> parseBackground(const std::string& text, RenderRequest& request);  // none, r,g,b or r,g,b:r,g,b
 Checked<std::array<float, 3>> parseTriple(const std::string& text, const char* option);
 
 inline constexpr std::uint32_t kLargestPicture = 16384;  // pixels an edge

@@ -28,7 +28,8 @@ class SceneReader {
   [[noreturn]] void fail(const std::string& at, const json& value, const std::string& expected) const {
     std::string shown = value.dump(-1, ' ', false, json::error_handler_t::replace);
     if (shown.size() > 60) shown = shown.substr(0, 57) + "...";
-    throw Refusal{kInvalid, fmt::format("{}: {} is {}; expected {}", path_, at.empty() ? "the scene" : at, shown, expected)};
+    throw Refusal{kInvalid,
+                  fmt::format("{}: {} is {}; expected {}", path_, at.empty() ? "the scene" : at, shown, expected)};
   }
 
   void object(const json& value, const std::string& at, const std::map<std::string, Member>& members) const {

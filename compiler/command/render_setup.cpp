@@ -9,8 +9,8 @@ namespace {
 using Vec = std::array<double, 3>;
 
 constexpr double kDegree = 3.14159265358979 / 180;
-constexpr double kAzimuth = 32 * kDegree;    // of the camera, from the front towards the right
-constexpr double kElevation = 14 * kDegree;  // above the horizon
+constexpr double kAzimuth = 32 * kDegree;      // of the camera, from the front towards the right
+constexpr double kElevation = 14 * kDegree;    // above the horizon
 constexpr double kSunAzimuth = -62 * kDegree;  // from the front towards the left: side light, which shows form
 constexpr double kSunElevation = 42 * kDegree;
 constexpr double kMargin = 1.06;
@@ -26,7 +26,9 @@ Vec direction(char up, double azimuth, double elevation) {
   return up == 'y' ? Vec{side, std::sin(elevation), front} : Vec{side, -front, std::sin(elevation)};
 }
 
-Vec upward(char up) { return up == 'y' ? Vec{0, 1, 0} : Vec{0, 0, 1}; }
+Vec upward(char up) {
+  return up == 'y' ? Vec{0, 1, 0} : Vec{0, 0, 1};
+}
 
 // How far from the box's centre the eye must be for the middle of every edge to lie in the picture: gas does not reach
 // into the corners.
@@ -122,6 +124,7 @@ runtime::DrawInfo setUp(const RenderRequest& request, const format::Pack& pack, 
   runtime::DrawInfo draw;
   draw.width = request.width;
   draw.height = request.height;
+  draw.colorFormat = runtime::ColorFormat::single;
   draw.view = chooseView(request, box, up);
   const bool ambientGiven = (volume.look.set >> 6 & 1u) != 0;
   const bool burning = suggested.emissionScale > 0 && request.look.fire > 0;

@@ -17,8 +17,7 @@ VKAPI_ATTR VkBool32 VKAPI_CALL onMessage(VkDebugUtilsMessageSeverityFlagBitsEXT,
 }
 
 VkDebugUtilsMessengerCreateInfoEXT messengerInfo(VulkanDevice* device) {
-  auto info =
-      begin<VkDebugUtilsMessengerCreateInfoEXT>(VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT);
+  auto info = begin<VkDebugUtilsMessengerCreateInfoEXT>(VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT);
   info.messageSeverity =
       VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
   info.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
@@ -90,8 +89,7 @@ Result<void> VulkanDevice::open(const DeviceOptions& options) {
 Result<void> VulkanDevice::loadLibrary() {
   library_ = dlopen("libvulkan.so.1", RTLD_NOW | RTLD_LOCAL);
   if (library_ == nullptr) return gpuError("no Vulkan: libvulkan.so.1 cannot be loaded (Debian package libvulkan1)");
-  vk.vkGetInstanceProcAddr =
-      reinterpret_cast<PFN_vkGetInstanceProcAddr>(dlsym(library_, "vkGetInstanceProcAddr"));
+  vk.vkGetInstanceProcAddr = reinterpret_cast<PFN_vkGetInstanceProcAddr>(dlsym(library_, "vkGetInstanceProcAddr"));
   if (vk.vkGetInstanceProcAddr == nullptr) return gpuError("no Vulkan: libvulkan.so.1 lacks vkGetInstanceProcAddr");
 #define BILLOW_LOAD(function) \
   vk.function = reinterpret_cast<PFN_##function>(vk.vkGetInstanceProcAddr(nullptr, #function));

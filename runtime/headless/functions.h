@@ -8,14 +8,14 @@
   X(vkCreateInstance)             \
   X(vkEnumerateInstanceLayerProperties)
 
-#define BILLOW_HEADLESS_INSTANCE(X)          \
-  X(vkCreateDevice)                          \
-  X(vkDestroyInstance)                       \
-  X(vkEnumeratePhysicalDevices)              \
-  X(vkGetDeviceProcAddr)                     \
-  X(vkGetPhysicalDeviceFeatures2)            \
-  X(vkGetPhysicalDeviceMemoryProperties)     \
-  X(vkGetPhysicalDeviceProperties)           \
+#define BILLOW_HEADLESS_INSTANCE(X)      \
+  X(vkCreateDevice)                      \
+  X(vkDestroyInstance)                   \
+  X(vkEnumeratePhysicalDevices)          \
+  X(vkGetDeviceProcAddr)                 \
+  X(vkGetPhysicalDeviceFeatures2)        \
+  X(vkGetPhysicalDeviceMemoryProperties) \
+  X(vkGetPhysicalDeviceProperties)       \
   X(vkGetPhysicalDeviceQueueFamilyProperties)
 
 #define BILLOW_HEADLESS_DEVICE(X)  \
@@ -30,14 +30,12 @@
   X(vkCmdWriteTimestamp2)          \
   X(vkCreateBuffer)                \
   X(vkCreateCommandPool)           \
-  X(vkCreateFence)                 \
   X(vkCreateImage)                 \
   X(vkCreateImageView)             \
   X(vkCreateQueryPool)             \
   X(vkDestroyBuffer)               \
   X(vkDestroyCommandPool)          \
   X(vkDestroyDevice)               \
-  X(vkDestroyFence)                \
   X(vkDestroyImage)                \
   X(vkDestroyImageView)            \
   X(vkDestroyQueryPool)            \
@@ -51,9 +49,8 @@
   X(vkGetQueryPoolResults)         \
   X(vkMapMemory)                   \
   X(vkQueueSubmit2)                \
-  X(vkResetCommandPool)            \
-  X(vkResetFences)                 \
-  X(vkWaitForFences)
+  X(vkQueueWaitIdle)               \
+  X(vkResetCommandPool)
 
 namespace billow::headless {
 

@@ -1,12 +1,23 @@
 #include "billow/headless/headless.h"
 
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <utility>
 
 #include "device.h"
 
 namespace billow::headless {
 namespace {
+
+float halfToFloat(std::uint16_t half) {
+  const float sign = (half & 0x8000u) != 0 ? -1.0f : 1.0f;
+  const int exponent = half >> 10 & 31;
+  const int mantissa = half & 1023;
+  if (exponent == 31) return mantissa != 0 ? std::nanf("") : sign * std::numeric_limits<float>::infinity();
+  if (exponent == 0) return sign * std::ldexp(static_cast<float>(mantissa), -24);
+  return sign * std::ldexp(static_cast<float>(mantissa + 1024), exponent - 25);
+}
 
 // Host-visible memory with a buffer, or device memory with an image; lives as long as one call.
 class Target {
@@ -109,7 +120,6 @@ class HeadlessImpl final : public Headless {
     if (device_.host.device == VK_NULL_HANDLE) return;
     device_.vk.vkDeviceWaitIdle(device_.host.device);
     if (queries_ != VK_NULL_HANDLE) device_.vk.vkDestroyQueryPool(device_.host.device, queries_, nullptr);
-    if (fence_ != VK_NULL_HANDLE) device_.vk.vkDestroyFence(device_.host.device, fence_, nullptr);
     if (pool_ != VK_NULL_HANDLE) device_.vk.vkDestroyCommandPool(device_.host.device, pool_, nullptr);
   }
 
@@ -117,15 +127,13 @@ class HeadlessImpl final : public Headless {
     if (auto done = device_.open(options); !done) return done;
     auto poolInfo = begin<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
     poolInfo.queueFamilyIndex = device_.host.drawFamily;
-    auto fenceInfo = begin<VkFenceCreateInfo>(VK_STRUCTURE_TYPE_FENCE_CREATE_INFO);
     auto queryInfo = begin<VkQueryPoolCreateInfo>(VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO);
     queryInfo.queryType = VK_QUERY_TYPE_TIMESTAMP;
     queryInfo.queryCount = 2;
     const VkDevice device = device_.host.device;
     if (device_.vk.vkCreateCommandPool(device, &poolInfo, nullptr, &pool_) != VK_SUCCESS ||
-        device_.vk.vkCreateFence(device, &fenceInfo, nullptr, &fence_) != VK_SUCCESS ||
         device_.vk.vkCreateQueryPool(device, &queryInfo, nullptr, &queries_) != VK_SUCCESS) {
-      return gpuError("a command pool, fence or query pool cannot be made");
+      return gpuError("a command pool or query pool cannot be made");
     }
     auto info = begin<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
     info.commandPool = pool_;
@@ -159,7 +167,13 @@ class HeadlessImpl final : public Headless {
             VK_ACCESS_2_HOST_READ_BIT);
     if (auto done = submitAndWait(renderer, *draw.frame); !done) return tl::unexpected(done.error());
     Picture picture{.width = draw.width, .height = draw.height, .rgba = {}, .depth = {}};
-    picture.rgba.assign(readBack.mapped, readBack.mapped + pixels * 4);
+    if (draw.colorFormat == runtime::ColorFormat::half) {
+      std::vector<std::uint16_t> halves(pixels * 4);
+      std::memcpy(halves.data(), readBack.mapped, halves.size() * 2);
+      for (const std::uint16_t half : halves) picture.rgba.push_back(halfToFloat(half));
+    } else {
+      picture.rgba.assign(readBack.mapped, readBack.mapped + pixels * 4);
+    }
     picture.depth.assign(readBack.mapped + pixels * 4, readBack.mapped + pixels * 5);
     return picture;
   }
@@ -208,9 +222,10 @@ class HeadlessImpl final : public Headless {
 
  private:
   Result<void> makeImages(runtime::DrawInfo& draw, Target& color, Target& depth) {
-    if (auto done = color.makeImage(VK_FORMAT_R32G32B32A32_SFLOAT, draw.width, draw.height); !done) return done;
+    const bool half = draw.colorFormat == runtime::ColorFormat::half;
+    const VkFormat format = half ? VK_FORMAT_R16G16B16A16_SFLOAT : VK_FORMAT_R32G32B32A32_SFLOAT;
+    if (auto done = color.makeImage(format, draw.width, draw.height); !done) return done;
     if (auto done = depth.makeImage(VK_FORMAT_R32_SFLOAT, draw.width, draw.height); !done) return done;
-    draw.colorFormat = runtime::ColorFormat::single;
     draw.color = color.view;
     draw.depth = depth.view;
     return {};
@@ -276,10 +291,10 @@ class HeadlessImpl final : public Headless {
     info.pWaitSemaphoreInfos = &wait;
     info.commandBufferInfoCount = 1;
     info.pCommandBufferInfos = &commandInfo;
-    const VkDevice device = device_.host.device;
-    VkResult result = device_.vk.vkQueueSubmit2(device_.host.uploadQueue, 1, &info, fence_);
-    if (result == VK_SUCCESS) result = device_.vk.vkWaitForFences(device, 1, &fence_, VK_TRUE, UINT64_MAX);
-    device_.vk.vkResetFences(device, 1, &fence_);
+    VkResult result = device_.vk.vkQueueSubmit2(device_.host.uploadQueue, 1, &info, VK_NULL_HANDLE);
+    // Not a fence: Mesa's software queue still touches the timeline semaphore after it has signalled one, so whoever
+    // destroyed the renderer at once would pull it from under the queue's thread.
+    if (result == VK_SUCCESS) result = device_.vk.vkQueueWaitIdle(device_.host.uploadQueue);
     if (result != VK_SUCCESS) return gpuError("the GPU failed with VkResult " + std::to_string(result));
     return {};
   }
@@ -287,7 +302,6 @@ class HeadlessImpl final : public Headless {
   VulkanDevice device_;
   VkCommandPool pool_ = VK_NULL_HANDLE;
   VkCommandBuffer commands_ = VK_NULL_HANDLE;
-  VkFence fence_ = VK_NULL_HANDLE;
   VkQueryPool queries_ = VK_NULL_HANDLE;
 };
 

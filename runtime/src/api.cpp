@@ -14,13 +14,13 @@ tl::unexpected<Error> vulkanError(const char* call, VkResult result) {
 
 Result<Api> loadApi(const HostDevice& host) {
   Api api;
-#define BILLOW_LOAD(name)                                                                               \
-  api.name = reinterpret_cast<PFN_##name>(host.getInstanceProcAddr(host.instance, #name));              \
+#define BILLOW_LOAD(name)                                                                  \
+  api.name = reinterpret_cast<PFN_##name>(host.getInstanceProcAddr(host.instance, #name)); \
   if (api.name == nullptr) return failure(ErrorCode::unsupported, "the Vulkan instance lacks " #name);
   BILLOW_INSTANCE_FUNCTIONS(BILLOW_LOAD)
 #undef BILLOW_LOAD
-#define BILLOW_LOAD(name)                                                                               \
-  api.name = reinterpret_cast<PFN_##name>(api.vkGetDeviceProcAddr(host.device, #name));                 \
+#define BILLOW_LOAD(name)                                                               \
+  api.name = reinterpret_cast<PFN_##name>(api.vkGetDeviceProcAddr(host.device, #name)); \
   if (api.name == nullptr) return failure(ErrorCode::unsupported, "the Vulkan device lacks " #name);
   BILLOW_DEVICE_FUNCTIONS(BILLOW_LOAD)
 #undef BILLOW_LOAD

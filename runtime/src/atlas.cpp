@@ -9,8 +9,8 @@ namespace {
 
 struct ClassTraits {
   VkFormat format;
-  std::uint32_t depth;       // texels along z of a slot
-  std::uint32_t blockSide;   // texels along x and y of a block
+  std::uint32_t depth;      // texels along z of a slot
+  std::uint32_t blockSide;  // texels along x and y of a block
   std::uint32_t blockBytes;
 };
 
@@ -51,9 +51,13 @@ void writeDecoded(const AtlasShape& shape, const AtlasBrick& brick, std::span<st
 
 }  // namespace
 
-VkFormat AtlasShape::format() const { return traits(which).format; }
+VkFormat AtlasShape::format() const {
+  return traits(which).format;
+}
 
-VkExtent3D AtlasShape::extent() const { return {8u << xBits, 8u << yBits, layers * traits(which).depth}; }
+VkExtent3D AtlasShape::extent() const {
+  return {8u << xBits, 8u << yBits, layers * traits(which).depth};
+}
 
 std::uint64_t AtlasShape::bytes() const {
   const ClassTraits& kind = traits(which);

@@ -9,7 +9,9 @@ namespace {
 
 constexpr std::uint64_t kSectionAlign = 16;
 
-std::uint64_t aligned(std::uint64_t bytes) { return (bytes + kSectionAlign - 1) / kSectionAlign * kSectionAlign; }
+std::uint64_t aligned(std::uint64_t bytes) {
+  return (bytes + kSectionAlign - 1) / kSectionAlign * kSectionAlign;
+}
 
 template <class T>
 std::span<const std::byte> bytesOf(const std::vector<T>& items) {
@@ -159,7 +161,8 @@ Result<StagedFrame> stageFrame(const Device& device, const format::Pack& pack, s
   if (frame >= record.frameCount) return failure(ErrorCode::argument, "the volume has no such frame");
   const GridChoice choice = options.grids.value_or(chooseGrids(pack, record));
   const std::uint32_t numbers[gpu::kGridSlots] = {choice.extinction, choice.temperature, choice.flames};
-  StagedFrame staged{.views = {}, .grids = {}, .shapes = {}, .slots = BrickSlots(device.bc7, device.bc4), .bufferBytes = 0};
+  StagedFrame staged{
+      .views = {}, .grids = {}, .shapes = {}, .slots = BrickSlots(device.bc7, device.bc4), .bufferBytes = 0};
   // Views must not move while bricks and masks are read from them.
   staged.views.reserve(gpu::kGridSlots);
   for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {

@@ -43,7 +43,9 @@ class DistanceField {
   }
 
   // In cells, 0 where a sample must be taken, at most 255. Indices from 0 within the box.
-  std::uint32_t at(std::uint32_t x, std::uint32_t y, std::uint32_t z) const { return cells_[number(x + 1, y + 1, z + 1)]; }
+  std::uint32_t at(std::uint32_t x, std::uint32_t y, std::uint32_t z) const {
+    return cells_[number(x + 1, y + 1, z + 1)];
+  }
 
  private:
   static constexpr std::uint8_t kFar = 255;
@@ -107,7 +109,9 @@ void addDistances(GpuGrid& grid) {
   }
 }
 
-void setBit(std::span<std::uint32_t> words, std::uint32_t bit) { words[bit >> 5] |= 1u << (bit & 31); }
+void setBit(std::span<std::uint32_t> words, std::uint32_t bit) {
+  words[bit >> 5] |= 1u << (bit & 31);
+}
 
 // Writes, for each mask word, how many bits come before it: two counts a word, the first in the low half.
 void writeRanks(std::span<const std::uint32_t> mask, std::span<std::uint32_t> ranks) {

@@ -10,14 +10,14 @@
 namespace billow::runtime {
 
 struct RegionLeaf {
-  std::uint32_t child;   // Node4 bit
+  std::uint32_t child;  // Node4 bit
   std::uint32_t record;
 };
 
 struct Region {
-  std::uint32_t number;  // Node5 bit
+  std::uint32_t number;            // Node5 bit
   std::vector<RegionLeaf> leaves;  // ascending child
-  std::uint32_t absent;  // record where there is no leaf; 0 is the background
+  std::uint32_t absent;            // record where there is no leaf; 0 is the background
 };
 
 // `regions` are all that the active box touches, by ascending number.

@@ -11,11 +11,11 @@ namespace billow::runtime {
 namespace {
 
 // Chosen by eye on smoke, dust, fire and explosions of several tools.
-constexpr double kSmokeDepth = 11;         // optical depth of the whole cloud, were it a cube of its densest gas
-constexpr double kDerivedSmokeDepth = 7;   // the same where smoke comes from temperature
-constexpr double kFireRadiance = 5.5;       // of the whole fire, were it a cube of its brightest gas
-constexpr float kHottest = 1800;           // kelvin at the largest temperature of the volume
-constexpr float kColdest = 300;            // kelvin at 0
+constexpr double kSmokeDepth = 11;        // optical depth of the whole cloud, were it a cube of its densest gas
+constexpr double kDerivedSmokeDepth = 7;  // the same where smoke comes from temperature
+constexpr double kFireRadiance = 5.5;     // of the whole fire, were it a cube of its brightest gas
+constexpr float kHottest = 1800;          // kelvin at the largest temperature of the volume
+constexpr float kColdest = 300;           // kelvin at 0
 
 // How much gas a grid frame holds, weighted by itself, so that thin haze counts for little.
 struct Amount {
@@ -25,8 +25,8 @@ struct Amount {
 
 double voxelSize(const format::GridFrame& frame) {
   const double(&m)[12] = frame.indexToWorld;
-  const double determinant = m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
-                             m[2] * (m[4] * m[9] - m[5] * m[8]);
+  const double determinant =
+      m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);
   return std::cbrt(std::abs(determinant));
 }
 

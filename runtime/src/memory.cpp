@@ -78,9 +78,8 @@ Result<Buffer> Buffer::make(Device& device, std::uint64_t size, VkBufferUsageFla
 
 Result<void> Buffer::bind(Placement placement) {
   const bool map = placement == Placement::mapped;
-  const VkMemoryPropertyFlags wanted =
-      map ? VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT
-          : VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
+  const VkMemoryPropertyFlags wanted = map ? VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT
+                                           : VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
   const auto memory = allocate(*device_, requirements_, wanted, addressable_);
   if (!memory) return tl::unexpected(memory.error());
   memory_ = *memory;

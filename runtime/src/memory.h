@@ -26,7 +26,7 @@ class Buffer {
 
   VkBuffer handle() const { return buffer_; }
   std::uint64_t allocationSize() const { return requirements_.size; }
-  VkDeviceAddress address() const;     // of buffers with shader device address usage
+  VkDeviceAddress address() const;  // of buffers with shader device address usage
   std::span<std::byte> mapped() const { return mapped_; }
 
  private:

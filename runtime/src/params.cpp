@@ -65,9 +65,9 @@ bool invertAffine(const double (&m)[12], double (&inverse)[12]) {
   };
   const double determinant = m[0] * minor(1, 2, 1, 2) - m[1] * minor(1, 2, 0, 2) + m[2] * minor(1, 2, 0, 1);
   if (!(std::abs(determinant) > 0) || !std::isfinite(1 / determinant)) return false;
-  const double cofactors[9] = {minor(1, 2, 1, 2), -minor(0, 2, 1, 2), minor(0, 1, 1, 2),
-                               -minor(1, 2, 0, 2), minor(0, 2, 0, 2), -minor(0, 1, 0, 2),
-                               minor(1, 2, 0, 1), -minor(0, 2, 0, 1), minor(0, 1, 0, 1)};
+  const double cofactors[9] = {minor(1, 2, 1, 2),  -minor(0, 2, 1, 2), minor(0, 1, 1, 2),
+                               -minor(1, 2, 0, 2), minor(0, 2, 0, 2),  -minor(0, 1, 0, 2),
+                               minor(1, 2, 0, 1),  -minor(0, 2, 0, 1), minor(0, 1, 0, 1)};
   for (int row = 0; row < 3; ++row) {
     double translation = 0;
     for (int column = 0; column < 3; ++column) {

@@ -38,7 +38,9 @@ Result<void> describeDevice(Device& device) {
   return {};
 }
 
-bool finite(const std::array<float, 3>& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
+bool finite(const std::array<float, 3>& v) {
+  return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
+}
 
 // Names the first field that is outside of what runtime.h allows, or null.
 const char* badField(const DrawInfo& draw) {

@@ -11,7 +11,9 @@ Vec cross(const Vec& a, const Vec& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-double length(const Vec& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+double length(const Vec& v) {
+  return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
 
 Vec unit(const Vec& v) {
   const double size = length(v);
@@ -47,8 +49,8 @@ GridChoice chooseGrids(const format::Pack& pack, const format::VolumeRecord& vol
     if (role == format::Role::temperature) choice.temperature = i;
     if (role == format::Role::flames) choice.flames = i;
   }
-  const bool any = choice.extinction != format::kNone || choice.temperature != format::kNone ||
-                   choice.flames != format::kNone;
+  const bool any =
+      choice.extinction != format::kNone || choice.temperature != format::kNone || choice.flames != format::kNone;
   if (!any && !grids.empty()) choice.extinction = 0;
   return choice;
 }

@@ -39,7 +39,7 @@ class Headless {
   // What the validation layer has said so far: empty is good.
   virtual const std::vector<std::string>& validationMessages() const = 0;
 
-  // Draws one frame and waits for it. draw.color, depth and colorFormat are filled in.
+  // Draws one frame in draw.colorFormat and waits for it. draw.color and draw.depth are filled in.
   virtual Result<Picture> render(runtime::Renderer& renderer, runtime::DrawInfo draw) = 0;
 
   // Draws `count` times and returns each dispatch's GPU time in milliseconds.

@@ -35,7 +35,7 @@ enum class ErrorCode {
 
 struct Error {
   ErrorCode code;
-  std::string message;  // one line
+  std::string message;                      // one line
   std::optional<format::Issue> issue = {};  // where code is pack
 };
 
@@ -51,8 +51,8 @@ struct HostDevice {
   PFN_vkGetInstanceProcAddr getInstanceProcAddr = nullptr;
   VkQueue uploadQueue = VK_NULL_HANDLE;  // transfer, graphics or compute; the host guards it during upload()
   std::uint32_t uploadFamily = 0;
-  std::uint32_t drawFamily = 0;           // of the queues that run recorded commands
-  bool textureCompressionBc = false;      // you checked and enabled it
+  std::uint32_t drawFamily = 0;       // of the queues that run recorded commands
+  bool textureCompressionBc = false;  // you checked and enabled it
 };
 
 struct Config {
@@ -125,11 +125,11 @@ struct Sun {
 struct Look {
   float extinctionScale = 1;
   std::array<float, 3> albedo{0.9f, 0.9f, 0.9f};
-  float anisotropy = 0.5f;          // in (-1, 1)
-  float emissionScale = 1;          // 0: no emission
-  float temperatureScale = 1000;    // kelvin a grid value
-  float temperatureOffset = 300;    // kelvin
-  float referenceKelvin = 1600;     // black body of radiance emissionScale, > 0
+  float anisotropy = 0.5f;        // in (-1, 1)
+  float emissionScale = 1;        // 0: no emission
+  float temperatureScale = 1000;  // kelvin a grid value
+  float temperatureOffset = 300;  // kelvin
+  float referenceKelvin = 1600;   // black body of radiance emissionScale, > 0
   std::array<float, 3> ambient{0.3f, 0.35f, 0.4f};
   std::uint32_t scatteringOrders = 1;  // 1: single scattering; more imitate multiple scattering; 1 to 8
   // Smoke derived from temperature (or flames) where there is no extinction grid: shares of heatMax at which smoke
@@ -172,10 +172,10 @@ struct DrawInfo {
 // Reads of single values, as the march makes them: a tool for tests.
 struct LookupInfo {
   const Frame* frame = nullptr;
-  std::uint32_t slot = 0;               // 0 extinction, 1 temperature, 2 flames
+  std::uint32_t slot = 0;  // 0 extinction, 1 temperature, 2 flames
   Filter filter = Filter::nearest;
-  VkDeviceAddress positions = 0;        // count times three floats, pack index space
-  VkDeviceAddress values = 0;           // count floats are written
+  VkDeviceAddress positions = 0;  // count times three floats, pack index space
+  VkDeviceAddress values = 0;     // count floats are written
   std::uint32_t count = 0;
 };
 
