@@ -23,6 +23,9 @@ namespace {
 // about 1 % of bytes on real smoke and fire.
 constexpr double kOutlierLimit = 16;
 
+// From this effort on every brick that BC7 might suit is encoded at full effort.
+constexpr int kFullEffort = 3;
+
 // Bytes that a stored mask adds beside a brick (spec: Mask3).
 constexpr std::uint32_t kMaskBytes = sizeof(format::Mask3);
 
@@ -106,27 +109,38 @@ class GridChooser {
     }
   }
 
-  void tryScalarBlocks() {
+  void tryR8() {
     forEachBrick([this](std::size_t i, Candidate& candidate) {
       if (quiet_[i]) return;
       encodeR8(source(i), candidate);
       add(i, candidate);
+    });
+  }
+
+  // BC4 and BC7 are dear to try, so they are left out where they cannot pay: the mix so far has a Lagrange multiplier
+  // at the PSNR asked, and a brick is passed over where even an optimistic guess of the new encoding's error loses
+  // against the brick's other choices at that multiplier, halved and doubled (the final one differs a little).
+  void tryBc4(std::optional<double> psnr) {
+    constexpr double kOptimism = 1;  // of R8's error, with half of its bits
+    const auto multiplier = multiplierAt(psnr);
+    forEachBrick([&](std::size_t i, Candidate& candidate) {
+      if (quiet_[i] || !mayPay(i, 256, choices_[i][1].squaredError * kOptimism, multiplier)) return;
       encodeBc4BestAxis(source(i), candidate);
       add(i, candidate);
     });
   }
 
-  // BC7 is by far the dearest to try, so it is left out where it cannot pay. Without it, the cheapest mix at the budget
-  // has a Lagrange multiplier; a brick is passed over where even an optimistic BC7 would lose against its other choices
-  // at that multiplier, halved and doubled (with BC7 in the mix it moves a little).
   void tryBc7(std::optional<double> psnr) {
-    const auto without = psnr ? solve(psnr) : std::nullopt;
+    constexpr double kOptimism = 1.5;  // of BC4's error, with half of its bits
+    const auto multiplier = multiplierAt(psnr);
+    const int effort = refinesBc7(psnr) ? 0 : quality_.effort;
     forEachBrick([&](std::size_t i, Candidate& candidate) {
-      if (quiet_[i]) return;
-      if (without && !bc7MayPay(i, without->multiplier * 0.5) && !bc7MayPay(i, without->multiplier * 2)) return;
-      encodeBc7BestAxis(source(i), quality_.effort, candidate);
+      if (quiet_[i] || choices_[i].size() < 3) return;
+      if (!mayPay(i, 128, choices_[i][2].squaredError * kOptimism, multiplier)) return;
+      encodeBc7BestAxis(source(i), effort, candidate);
       add(i, candidate);
     });
+    if (refinesBc7(psnr)) refineBc7(psnr);
   }
 
   void tryR16() {
@@ -212,16 +226,48 @@ class GridChooser {
   BrickSource source(std::size_t i) const {
     return {&grid_.leaves[i].values, &grid_.leaves[i].active, counts_[i], grid_.background};
   }
-  // choices_[i] holds constant, R8 and BC4. BC7 spends half of BC4's bits; on bricks where it shines it comes within
-  // kBc7Optimism of BC4's error.
-  bool bc7MayPay(std::size_t i, double multiplier) const {
-    constexpr double kBc7Optimism = 1.5;
-    const std::vector<Choice>& choices = choices_[i];
-    const auto cost = [&](const Choice& choice) { return choice.squaredError + multiplier * choice.bytes; };
-    const Choice& bc4 = choices[2];
-    const Choice hoped{bc4.bytes - 128, bc4.squaredError * kBc7Optimism, 0};
-    return cost(hoped) < std::min({cost(choices[0]), cost(choices[1]), cost(bc4)});
+  // Squared error that a byte saves at the margin in the mix so far, outliers allowed; and the largest error that
+  // counts.
+  struct Margin {
+    double multiplier;
+    float limit;
+  };
+  std::optional<Margin> multiplierAt(std::optional<double> psnr) const {
+    if (!psnr) return std::nullopt;
+    const auto mix = allocate(choices_, budget(psnr), std::numeric_limits<float>::infinity());
+    if (!mix) return std::nullopt;
+    return Margin{mix->multiplier, errorLimit(psnr)};
   }
+  // Could an encoding of `bytes` with this error win on brick i? Always where the margin is not known.
+  bool mayPay(std::size_t i, std::uint32_t bytes, double squaredError, const std::optional<Margin>& margin) const {
+    if (!margin) return true;
+    const std::uint32_t mask = counts_[i] == format::kBrickVoxels ? 0 : kMaskBytes;
+    for (const double multiplier : {margin->multiplier * 0.5, margin->multiplier * 2}) {
+      const double hoped = squaredError + multiplier * (bytes + mask);
+      const auto wins = [&](const Choice& other) {
+        return other.maxError > margin->limit || hoped < other.squaredError + multiplier * other.bytes;
+      };
+      if (std::all_of(choices_[i].begin(), choices_[i].end(), wins)) return true;
+    }
+    return false;
+  }
+
+  // Up to effort 2 every brick is judged by BC7's fastest encoder, and only those that end as BC7 are encoded better.
+  bool refinesBc7(std::optional<double> psnr) const {
+    return psnr && quality_.effort > 0 && quality_.effort < kFullEffort;
+  }
+  void refineBc7(std::optional<double> psnr) {
+    const auto chosen = solve(psnr);
+    if (!chosen) return;
+    forEachBrick([&](std::size_t i, Candidate& candidate) {
+      const std::uint32_t choice = chosen->chosen[i];
+      const std::uint32_t encoding = bricks_[i].tried[choice].encoding;
+      if (encoding < format::kEncodingBc7Z || encoding > format::kEncodingBc7X) return;
+      encodeBc7(source(i), encoding, quality_.effort, candidate);
+      if (candidate.squaredError < choices_[i][choice].squaredError) add(i, candidate);
+    });
+  }
+
   void add(std::size_t i, const Candidate& candidate) {
     const std::uint32_t bytes = *format::brickBytes(candidate.encoding);
     const bool stored = counts_[i] != format::kBrickVoxels && !candidate.texelMask;
@@ -298,7 +344,8 @@ std::vector<ChosenGrid> chooseEncodings(std::span<const ImportedGrid> grids, con
     choosers[g] = std::make_unique<GridChooser>(grids[g], quality);
     choosers[g]->tryConstants();
     choosers[g]->settleQuietBricks(quality.psnr);
-    choosers[g]->tryScalarBlocks();
+    choosers[g]->tryR8();
+    choosers[g]->tryBc4(quality.psnr);
     choosers[g]->tryBc7(quality.psnr);
     if (quality.maxError) choosers[g]->tryR16();
   }
