@@ -98,7 +98,7 @@ class Comparison {
       const compiler::ImportedFrame source = compiler::importFrame(planned, frame, options_, printWarning);
       for (std::size_t g = 0; g < planned.grids.size(); ++g) {
         Row row{planned.name, planned.grids[g].name, frame.number, {}, 0, ""};
-        const auto issue = compareGrid(source.grids[g], volume, static_cast<std::uint32_t>(index), row);
+        auto issue = compareGrid(source.grids[g], volume, static_cast<std::uint32_t>(index), row);
         if (issue) return issue;
         if (source.grids[g].present || !row.problem.empty()) rows_.push_back(row);
       }

@@ -248,6 +248,7 @@ void checkSelection(const std::vector<Planned>& volumes, const std::vector<std::
     });
     if (known) continue;
     std::vector<std::string> offered;
+    offered.reserve(volumes.size());
     for (const Planned& planned : volumes) offered.push_back(planned.offered);
     throw Error(Fault::commandLine,
                 fmt::format("--grid {}: no such grid in any frame; there is: {}", name, fmt::join(offered, "; ")));

@@ -120,6 +120,7 @@ std::optional<Role> roleByWord(std::string_view word) {
 
 std::string roleWords() {
   std::vector<std::string_view> words;
+  words.reserve(kWords.size());
   for (const auto& [known, role] : kWords) words.push_back(known);
   return fmt::format("{}", fmt::join(words, ", "));
 }

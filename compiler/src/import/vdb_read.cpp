@@ -144,6 +144,15 @@ class TreeSource {
     activeVoxels_ += active;
   }
 
+  // Voxel index -> value; a pointer where the leaf has one, for getValue() asks each time whether it is loaded.
+  static auto valuesOf(const LeafT& leaf) {
+    if constexpr (std::is_same_v<ValueT, bool>) {
+      return [&leaf](std::uint32_t i) { return leaf.getValue(i); };
+    } else {
+      return [data = leaf.buffer().data()](std::uint32_t i) -> const ValueT& { return data[i]; };
+    }
+  }
+
   static void convertLeaf(const LeafT& leaf, std::uint32_t component, float background, Leaf& out, Notes& notes) {
     out.origin = toArray(leaf.origin());
     for (std::uint32_t word = 0; word < 8; ++word) {
@@ -153,10 +162,11 @@ class TreeSource {
     }
     notes.min = std::numeric_limits<float>::max();
     notes.max = std::numeric_limits<float>::lowest();
+    const auto values = valuesOf(leaf);
     for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) {
       float value = background;
       if (format::maskBit(out.active, i)) {
-        value = convert(componentOf(leaf.getValue(i), component), i, notes);
+        value = convert(componentOf(values(i), component), i, notes);
         notes.min = std::min(notes.min, value);
         notes.max = std::max(notes.max, value);
       }
