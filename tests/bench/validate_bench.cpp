@@ -4,8 +4,8 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "../sample_pack.h"
 #include "billow/format/validate.h"
-#include "sample_pack.h"
 
 namespace {
 

@@ -126,7 +126,7 @@ std::map<std::string, Layout> documentedLayouts() {
       const std::size_t end = line.find('`', 5);
       name = line.substr(5, end - 5);
       all[name].size = static_cast<std::size_t>(std::atoi(line.c_str() + end + 3));
-    } else if (line.rfind("#", 0) == 0) {
+    } else if (line.starts_with('#')) {
       name.clear();
     } else if (!name.empty() && line.size() > 2 && std::isdigit(static_cast<unsigned char>(line[2])) != 0) {
       std::istringstream row(line);
