@@ -21,7 +21,7 @@ bool sampled3D(const Device& device, VkFormat format) {
              VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT, 0, &limits) == VK_SUCCESS;
 }
 
-Result<void> describeDevice(Device& device) {
+Result<void> describeDevice(Device& device, BlockUse use) {
   auto driver = begin<VkPhysicalDeviceVulkan12Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_PROPERTIES);
   auto properties = begin<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
   properties.pNext = &driver;
@@ -35,6 +35,9 @@ Result<void> describeDevice(Device& device) {
   device.bc4 = device.host.textureCompressionBc && sampled3D(device, VK_FORMAT_BC4_UNORM_BLOCK);
   // Mesa's software decoder truncates what BC4 interpolates, which is off by one from what the format promises.
   if (driver.driverID == VK_DRIVER_ID_MESA_LLVMPIPE) device.bc4 = false;
+  // In software a block is decoded anew for each texel that is read: six times as slow as R8.
+  const bool software = properties.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
+  if (use == BlockUse::decoded || (use == BlockUse::automatic && software)) device.bc7 = device.bc4 = false;
   return {};
 }
 
@@ -69,8 +72,7 @@ class RendererImpl final : public Renderer {
         uploads_(device_) {}
 
   Result<void> initialise(const Config& config) {
-    if (auto known = describeDevice(device_); !known) return known;
-    if (config.decodeBlocks) device_.bc7 = device_.bc4 = false;
+    if (auto known = describeDevice(device_, config.blocks); !known) return known;
     if (auto made = passes_.create(); !made) return made;
     return uploads_.create();
   }

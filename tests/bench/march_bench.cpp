@@ -96,12 +96,12 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-void measure(headless::Headless& gpu, const format::Pack& pack, const Options& options, bool decodeBlocks,
+void measure(headless::Headless& gpu, const format::Pack& pack, const Options& options, runtime::BlockUse blocks,
              const std::vector<Variant>& variants) {
   const format::VolumeRecord& volume = pack.volumes()[0];
   const runtime::GridChoice grids = runtime::chooseGrids(pack, volume);
   const auto renderer = valueOf(runtime::Renderer::create(
-      gpu.host(), {.gpuBudget = std::uint64_t{8} << 30, .recordsInFlight = 3, .decodeBlocks = decodeBlocks}));
+      gpu.host(), {.gpuBudget = std::uint64_t{8} << 30, .recordsInFlight = 3, .blocks = blocks}));
   const std::uint32_t frameIndex = options.frame != format::kNone ? options.frame : volume.frameCount / 2;
   runtime::DrawInfo draw;
   draw.look = valueOf(runtime::suggestLook(pack, volume, grids));
@@ -119,10 +119,10 @@ void measure(headless::Headless& gpu, const format::Pack& pack, const Options& o
     const double milliseconds = median(valueOf(gpu.time(*renderer, draw, options.draws)));
     const runtime::FrameStats& stats = frame->stats();
     fmt::print("{:<6} {:<5} {:<10} {:<10} {:>9.3f} {:>10.1f} {:>10.1f} {:>10.1f} {:>10.1f} {:>10.1f}\n",
-               decodeBlocks ? "R8" : "blocks", nameOf(variant.index), nameOf(variant.filter), nameOf(variant.shadows),
-               milliseconds, static_cast<double>(stats.indexBytes) / 1e3, static_cast<double>(stats.recordBytes) / 1e3,
-               static_cast<double>(stats.maskBytes) / 1e3, static_cast<double>(stats.brickBytes) / 1e3,
-               static_cast<double>(stats.allocatedBytes) / 1e3);
+               blocks == runtime::BlockUse::decoded ? "R8" : "blocks", nameOf(variant.index), nameOf(variant.filter),
+               nameOf(variant.shadows), milliseconds, static_cast<double>(stats.indexBytes) / 1e3,
+               static_cast<double>(stats.recordBytes) / 1e3, static_cast<double>(stats.maskBytes) / 1e3,
+               static_cast<double>(stats.brickBytes) / 1e3, static_cast<double>(stats.allocatedBytes) / 1e3);
     std::fflush(stdout);
     gpu.waitIdle();
   }
@@ -146,8 +146,8 @@ int main(int argc, char** argv) {
     }
     variants.push_back({index, Filter::trilinear, Filter::trilinear});
   }
-  measure(*gpu, pack, options, false, variants);
-  measure(*gpu, pack, options, true,
+  measure(*gpu, pack, options, runtime::BlockUse::native, variants);
+  measure(*gpu, pack, options, runtime::BlockUse::decoded,
           {{Index::flat, Filter::nearest, Filter::nearest}, {Index::flat, Filter::trilinear, Filter::nearest}});
   return 0;
 }

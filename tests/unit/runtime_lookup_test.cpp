@@ -13,6 +13,7 @@ namespace billow::tests {
 namespace {
 
 using format::GridView;
+using runtime::BlockUse;
 using runtime::Filter;
 using runtime::Index;
 
@@ -95,7 +96,7 @@ double cpuTrilinear(const GridView& view, const float* p) {
 
 struct LookupCase {
   Index index;
-  bool decodeBlocks;
+  BlockUse blocks;
 };
 
 class Lookup : public GpuTest, public testing::WithParamInterface<LookupCase> {};
@@ -104,7 +105,7 @@ TEST_P(Lookup, NearestIsTheSameToTheBit) {
   const format::Pack pack = openPack(everything());
   const auto view = GridView::load(pack, pack.gridFrames()[0]);
   ASSERT_TRUE(view.has_value());
-  const auto renderer = makeRenderer({.decodeBlocks = GetParam().decodeBlocks});
+  const auto renderer = makeRenderer({.blocks = GetParam().blocks});
   const auto frame = upload(*renderer, pack, 0, {.index = GetParam().index});
   const std::vector<float> positions = interestingVoxels(*view);
   const auto values = gpu().lookup(*renderer, *frame, 0, Filter::nearest, positions);
@@ -124,7 +125,7 @@ TEST_P(Lookup, TrilinearIsExactAcrossFaces) {
   const format::Pack pack = openPack(everything());
   const auto view = GridView::load(pack, pack.gridFrames()[0]);
   ASSERT_TRUE(view.has_value());
-  const auto renderer = makeRenderer({.decodeBlocks = GetParam().decodeBlocks});
+  const auto renderer = makeRenderer({.blocks = GetParam().blocks});
   const auto frame = upload(*renderer, pack, 0, {.index = GetParam().index});
   std::vector<float> positions;
   std::mt19937 random(5);
@@ -141,9 +142,11 @@ TEST_P(Lookup, TrilinearIsExactAcrossFaces) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Lookup,
-                         testing::Values(LookupCase{Index::flat, false}, LookupCase{Index::tree, false},
-                                         LookupCase{Index::dense, false}, LookupCase{Index::flat, true},
-                                         LookupCase{Index::tree, true}));
+                         testing::Values(LookupCase{Index::flat, BlockUse::native},
+                                         LookupCase{Index::tree, BlockUse::native},
+                                         LookupCase{Index::dense, BlockUse::native},
+                                         LookupCase{Index::flat, BlockUse::decoded},
+                                         LookupCase{Index::tree, BlockUse::decoded}));
 
 class Upload : public GpuTest {};
 
@@ -155,7 +158,7 @@ TEST_F(Upload, CountsTheBytesThatTheFormatPromises) {
     grid.brick({10, 11, 10}, format::kEncodingR8, randomBytes(512, 9), 0, 0.01f, 0, someMask(1));
     grid.brick({10, 11, 11}, format::kEncodingR16, randomBytes(1024, 9), 0, 0.0001f, format::kMaskAll);
   }));
-  const auto renderer = makeRenderer();
+  const auto renderer = makeRenderer({.blocks = BlockUse::native});
   const std::uint64_t before = renderer->bytesInUse();
   const auto frame = upload(*renderer, pack);
   const format::GpuBytes promised = format::gpuBytes(pack.gridFrames()[0]);

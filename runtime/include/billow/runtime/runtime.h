@@ -55,10 +55,14 @@ struct HostDevice {
   bool textureCompressionBc = false;  // you checked and enabled it
 };
 
+// What becomes of BC7 and BC4 bricks. Automatic: they stay blocks where the device reads them exactly and fast, else
+// they are decoded to R8, as on software devices. native: blocks wherever they are read exactly.
+enum class BlockUse { automatic, native, decoded };
+
 struct Config {
   std::uint64_t gpuBudget = std::uint64_t{1} << 30;  // bytes of all memory that billow allocates, staging included
   std::uint32_t recordsInFlight = 3;  // record() and recordLookup() calls whose commands may be pending at once
-  bool decodeBlocks = false;          // keep BC7 and BC4 bricks as R8, as on devices without BC 3D images
+  BlockUse blocks = BlockUse::automatic;
 };
 
 enum class Index : std::uint32_t { flat = 0, tree = 1, dense = 2, automatic = 3 };
