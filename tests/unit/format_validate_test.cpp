@@ -436,6 +436,47 @@ TEST(Rules, Constants) {
   expectIssue(605, [](PackImage& i) { i.gridFrames[0].valueMax = 1; });
 }
 
+// Bytes, then zeros up to a size of its own; reads that touch [failFrom, failTo) fail.
+class OddSource : public ByteSource {
+ public:
+  OddSource(std::vector<std::byte> bytes, std::uint64_t size, std::uint64_t failFrom, std::uint64_t failTo)
+      : bytes_(std::move(bytes)), size_(size), failFrom_(failFrom), failTo_(failTo) {}
+  std::uint64_t size() const override { return size_; }
+  bool read(std::uint64_t offset, std::span<std::byte> into) const override {
+    if (offset < failTo_ && offset + into.size() > failFrom_) return false;
+    for (std::size_t i = 0; i < into.size(); ++i)
+      into[i] = offset + i < bytes_.size() ? bytes_[offset + i] : std::byte{0};
+    return true;
+  }
+
+ private:
+  std::vector<std::byte> bytes_;
+  std::uint64_t size_, failFrom_, failTo_;
+};
+
+TEST(Sources, FailedReadsAreReportedAsSuch) {
+  const std::uint64_t size = sample().size();
+  for (std::uint64_t at = 0; at < size; at += 16) {
+    const OddSource source(sample(), size, at, at + 1);
+    bool reported = false;
+    validate(source, {}, [&](const Issue& issue) { reported = reported || issue.kind->id == 2; });
+    EXPECT_TRUE(reported) << at;
+    const Result<Pack> pack = Pack::open(std::make_unique<OddSource>(sample(), size, at, at + 1));
+    EXPECT_EQ(pack ? 2 : pack.error().kind->id, 2) << at;
+  }
+}
+
+TEST(Limits, HugeTablesAreRefusedBeforeTheyAreRead) {
+  std::vector<std::byte> bytes = PackImage::of(tests::smallestPack()).assemble();
+  constexpr std::size_t kPageTable = 7;
+  const std::uint64_t size = bytes.size() + sizeof(PageRecord) * 20'000'000;
+  editEntry(bytes, kPageTable, [&](SectionEntry& e) { e.size = size - e.offset; });
+  editHeader(bytes, [&](FileHeader& h) { h.fileSize = size; });
+  const Result<Pack> pack = Pack::open(std::make_unique<OddSource>(bytes, size, bytes.size(), size));
+  ASSERT_FALSE(pack);
+  EXPECT_EQ(pack.error().kind->id, 4);
+}
+
 // A page of zeros takes few bytes: many of them would fill the memory if a grid frame could have them all at once.
 TEST(Limits, EndlessPagesAreRefused) {
   const std::vector<std::uint32_t> zeros(kMaxPageBytes / 4);
