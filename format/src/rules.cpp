@@ -13,7 +13,7 @@ namespace billow::format {
 namespace {
 
 constexpr std::uint64_t kMostPadding = 4096;
-constexpr std::size_t kPiece = std::size_t{1} << 20;
+constexpr std::size_t kPiece = std::size_t{256} << 10;  // stays in a cache between reading and hashing
 
 struct SectionKind {
   std::string_view name;
