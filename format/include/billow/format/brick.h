@@ -13,10 +13,16 @@
 namespace billow::format {
 
 // Index of voxel (x, y, z) in a brick's arrays on the CPU and in its mask: x * 64 + y * 8 + z.
-constexpr std::uint32_t voxelIndex(std::uint32_t x, std::uint32_t y, std::uint32_t z) { return x << 6 | y << 3 | z; }
+constexpr std::uint32_t voxelIndex(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+  return x << 6 | y << 3 | z;
+}
 
-constexpr std::uint32_t encodingOf(const Node3& node) { return node.brick >> kEncodingShift; }
-constexpr std::uint32_t unitOf(const Node3& node) { return node.brick & kBrickUnitMask; }
+constexpr std::uint32_t encodingOf(const Node3& node) {
+  return node.brick >> kEncodingShift;
+}
+constexpr std::uint32_t unitOf(const Node3& node) {
+  return node.brick & kBrickUnitMask;
+}
 
 // Stored bytes of a brick: 0, 128, 256, 512 or 1024; nullopt for an unknown encoding.
 constexpr std::optional<std::uint32_t> brickBytes(std::uint32_t encoding) {

@@ -21,13 +21,13 @@ struct IssueKind {
 
 // Where in the pack. Whatever is not known is absent.
 struct Place {
-  std::string_view section = {};  // four letters, or "header", "contents"; a literal
+  std::string_view section = {};             // four letters, or "header", "contents"; a literal
   std::optional<std::uint64_t> offset = {};  // bytes from the start of the file
   std::optional<std::uint32_t> page = {};
   std::optional<std::uint32_t> volume = {};
   std::optional<std::int32_t> frame = {};  // the source's number
   std::optional<std::uint32_t> grid = {};
-  std::string_view nodeKind = {};  // "Node5", "Node4", "Node3", "mask", "brick", "child"; a literal
+  std::string_view nodeKind = {};          // "Node5", "Node4", "Node3", "mask", "brick", "child"; a literal
   std::optional<std::uint64_t> node = {};  // global index
 };
 

@@ -241,23 +241,23 @@ inline constexpr std::uint32_t kBrickClassCount = 4;
 // One grid in one frame: the frame's constants and root.
 struct GridFrame {
   std::uint32_t flags;
-  std::uint32_t node5;           // global index; kNone where no voxel is active
-  std::int32_t origin[3];        // source index of pack voxel (0, 0, 0); multiples of 8
-  std::int32_t activeMin[3];     // inclusive box of active voxels and tiles in pack index space [0, 4095];
-  std::int32_t activeMax[3];     //   min > max where nothing is active
-  float background;              // value of everything outside and inactive
-  float valueMin;                // of all reconstructed values, background included
+  std::uint32_t node5;        // global index; kNone where no voxel is active
+  std::int32_t origin[3];     // source index of pack voxel (0, 0, 0); multiples of 8
+  std::int32_t activeMin[3];  // inclusive box of active voxels and tiles in pack index space [0, 4095];
+  std::int32_t activeMax[3];  //   min > max where nothing is active
+  float background;           // value of everything outside and inactive
+  float valueMin;             // of all reconstructed values, background included
   float valueMax;
-  float sourceMin;               // of the source's active values and background: the PSNR's range
+  float sourceMin;  // of the source's active values and background: the PSNR's range
   float sourceMax;
-  float maxError;                // largest |reconstructed - source| over active voxels
+  float maxError;  // largest |reconstructed - source| over active voxels
   std::uint32_t reserved;
-  double squaredError;           // sum over active voxels
-  double indexToWorld[12];       // 3x4, row-major: world = M * (pack index, 1); voxel centres are at integers
-  std::uint64_t activeVoxels;    // tiles included
-  std::uint32_t pageListBegin;   // pages that hold everything this grid frame needs
+  double squaredError;          // sum over active voxels
+  double indexToWorld[12];      // 3x4, row-major: world = M * (pack index, 1); voxel centres are at integers
+  std::uint64_t activeVoxels;   // tiles included
+  std::uint32_t pageListBegin;  // pages that hold everything this grid frame needs
   std::uint32_t pageListCount;
-  std::uint32_t node4Count;      // distinct, reachable from node5
+  std::uint32_t node4Count;  // distinct, reachable from node5
   std::uint32_t node3Count;
   std::uint32_t maskCount;
   std::uint32_t childCount;                    // children of the Node5 and of each distinct Node4, summed
