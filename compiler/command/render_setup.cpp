@@ -66,7 +66,7 @@ runtime::Sun chooseSun(const RenderRequest& request, char up, bool burning) {
                          static_cast<float>(towards[2])};
   const Triple color = request.sunColor.value_or(Triple{1.0f, 0.93f, 0.82f});
   // Beside a fire the sun is a dim one, so that the fire is what lights the picture.
-  const float intensity = request.sunIntensity.value_or(burning ? 3.2f : 12.0f);
+  const float intensity = request.sunIntensity.value_or(burning ? 3.2f : 8.5f);
   runtime::Sun sun;
   sun.direction = request.sunDirection.value_or(direction);
   sun.irradiance = {color[0] * intensity, color[1] * intensity, color[2] * intensity};

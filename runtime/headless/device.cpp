@@ -1,9 +1,11 @@
 #include "device.h"
 
 #include <dlfcn.h>
+#include <link.h>
 
 #include <algorithm>
 #include <cstring>
+#include <string_view>
 
 namespace billow::headless {
 namespace {
@@ -40,6 +42,16 @@ struct Features {
   Features(const Features&) = delete;
   Features& operator=(const Features&) = delete;
 };
+
+// Drivers and layers leave threads, exit handlers and memory behind, so they stay loaded when the loader lets go of
+// them: unloading them has no use, and would leave leak checkers without a name for what they find.
+int keepLoaded(dl_phdr_info* library, std::size_t, void*) {
+  const std::string_view name = library->dlpi_name != nullptr ? library->dlpi_name : "";
+  if (name.find("/libvulkan_") == std::string_view::npos && name.find("/libVkLayer") == std::string_view::npos)
+    return 0;
+  dlopen(library->dlpi_name, RTLD_NOW | RTLD_NOLOAD | RTLD_NODELETE);
+  return 0;
+}
 
 // Preference among devices: discrete, integrated, virtual, software.
 int rank(VkPhysicalDeviceType type) {
@@ -188,6 +200,7 @@ Result<void> VulkanDevice::createDevice() {
   vk.function = reinterpret_cast<PFN_##function>(vk.vkGetDeviceProcAddr(host.device, #function));
   BILLOW_HEADLESS_DEVICE(BILLOW_LOAD)
 #undef BILLOW_LOAD
+  dl_iterate_phdr(keepLoaded, nullptr);
   vk.vkGetDeviceQueue(host.device, host.drawFamily, 0, &host.uploadQueue);
   return {};
 }
