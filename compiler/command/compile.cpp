@@ -11,6 +11,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
+#include "billow/format/writer.h"
 #include "command.h"
 #include "import_options.h"
 
@@ -20,8 +21,10 @@ namespace {
 std::atomic<bool> interrupted{false};
 
 extern "C" void onInterrupt(int signal) {
-  // A second signal ends the process at once; the unfinished file has a temporary name.
-  if (interrupted.exchange(true)) std::_Exit(128 + signal);
+  // The first signal lets compile() stop and clean up by itself, a second ends the process at once.
+  if (!interrupted.exchange(true)) return;
+  format::removeUnfinishedFiles();
+  std::_Exit(128 + signal);
 }
 
 struct Arguments {

@@ -86,6 +86,7 @@ class Compiler {
   static format::PackWriter::Options writerOptions(const CompileOptions& options) {
     format::PackWriter::Options result;
     result.zstdLevel = options.zstdLevel;
+    result.threads = options.threads;
     return result;
   }
 

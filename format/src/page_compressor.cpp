@@ -26,8 +26,9 @@ CompressedPage compress(ZSTD_CCtx* context, std::vector<std::byte> raw, int leve
 
 }  // namespace
 
-PageCompressor::PageCompressor(int zstdLevel)
-    : level_(zstdLevel), threadLimit_(std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, 8)) {}
+PageCompressor::PageCompressor(int zstdLevel, unsigned threads)
+    : level_(zstdLevel),
+      threadLimit_(std::clamp<std::size_t>(threads != 0 ? threads : std::thread::hardware_concurrency(), 1, 8)) {}
 
 PageCompressor::~PageCompressor() {
   {

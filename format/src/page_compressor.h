@@ -23,7 +23,7 @@ struct CompressedPage {
 // Memory is bounded: the caller takes the oldest page whenever full() says so.
 class PageCompressor {
  public:
-  explicit PageCompressor(int zstdLevel);
+  PageCompressor(int zstdLevel, unsigned threads);  // 0: as many as the machine has, at most 8
   PageCompressor(const PageCompressor&) = delete;
   PageCompressor& operator=(const PageCompressor&) = delete;
   ~PageCompressor();

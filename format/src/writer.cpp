@@ -45,7 +45,8 @@ StringRef PackTables::addString(const std::string& text) {
 }
 
 struct PackWriter::Impl {
-  Impl(std::string path, Options given) : options(given), file(std::move(path)), compressor(given.zstdLevel) {
+  Impl(std::string path, Options given)
+      : options(given), file(std::move(path)), compressor(given.zstdLevel, given.threads) {
     options.pageBytes = std::clamp<std::uint32_t>(options.pageBytes, 1, kMaxPageBytes);
   }
 

@@ -36,6 +36,7 @@ class PackWriter {
   struct Options {
     std::uint32_t pageBytes = 128u << 10;  // raw bytes at which a page is closed
     int zstdLevel = 3;
+    unsigned threads = 0;  // that compress pages; 0: as many as the machine has, at most 8. The bytes are the same.
   };
   PackWriter(std::string path, Options options);
   PackWriter(const PackWriter&) = delete;
