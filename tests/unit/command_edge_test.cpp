@@ -18,7 +18,7 @@ struct EdgeCase {
   std::string input;                   // under edge/
   int code = 0;                        // of compile
   std::vector<std::string> says = {};  // each must be in what it prints on stderr
-  std::string options = "";            // of compile and of compare
+  std::string options = {};            // of compile and of compare
   double psnr = 45;                    // that compare must find at least, or an exact copy
 };
 

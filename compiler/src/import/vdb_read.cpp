@@ -274,7 +274,7 @@ std::array<double, 12> matrixOf(const openvdb::math::Transform& transform, const
     for (int column = 0; column < 4; ++column) {
       const double value = m(column, row);
       sound = sound && std::isfinite(value);
-      result[static_cast<std::size_t>(row * 4 + column)] = value;
+      result[static_cast<std::size_t>(row) * 4 + static_cast<std::size_t>(column)] = value;
     }
   }
   const double volume = openvdb::Mat3d(m.getMat3()).det();

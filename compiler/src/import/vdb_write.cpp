@@ -66,7 +66,7 @@ openvdb::math::Transform::Ptr transformOf(const std::array<double, 12>& indexToW
   openvdb::Mat4d matrix = openvdb::Mat4d::identity();
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column) {
-      matrix(column, row) = indexToWorld[static_cast<std::size_t>(row * 4 + column)];
+      matrix(column, row) = indexToWorld[static_cast<std::size_t>(row) * 4 + static_cast<std::size_t>(column)];
     }
   }
   return openvdb::math::Transform::createLinearTransform(matrix);
