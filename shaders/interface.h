@@ -56,7 +56,7 @@ struct GridParams {
   ivec4 cellDim;          // cells of the active box; w: record of an absent Node4
   vec4 boxMin;            // support of the active voxels under trilinear filtering, pack index space; w: background
   vec4 boxMax;            // w: 1 when absent cells are skippable (the background is 0)
-  vec4 toIndex[3];        // rows: pack index = (row.xyz · (world - eye)) + row.w
+  vec4 toIndex[3];        // rows: pack index = dot(row.xyz, world - eye) + row.w
 };
 BILLOW_GPU_SIZE(GridParams, 160);
 

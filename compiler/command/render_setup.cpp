@@ -30,16 +30,16 @@ Vec upward(char up) {
   return up == 'y' ? Vec{0, 1, 0} : Vec{0, 0, 1};
 }
 
-// How far from the box's centre the eye must be for the middle of every edge to lie in the picture: gas does not reach
-// into the corners.
+// How far from the box's centre the eye must be for the box to lie in the picture. Gas hardly reaches into the very
+// corners, so that they may touch the frame while edges and faces keep a margin.
 double fittingDistance(const runtime::WorldBox& box, const Vec& center, const runtime::View& view, double aspect) {
   const double tanY = double{view.tanHalfHeight} / kMargin;
   double distance = 0;
   for (int place = 0; place < 27; ++place) {
     const int sides[3] = {place / 9 - 1, place / 3 % 3 - 1, place % 3 - 1};
-    if (sides[0] * sides[1] * sides[2] != 0) continue;
+    const double reach = sides[0] * sides[1] * sides[2] != 0 ? 1 / kMargin : 1;
     Vec at;
-    for (std::size_t i = 0; i < 3; ++i) at[i] = sides[i] * (box.max[i] - center[i]);
+    for (std::size_t i = 0; i < 3; ++i) at[i] = sides[i] * (box.max[i] - center[i]) * reach;
     const double across = std::max(std::abs(dot(at, view.right)) / (tanY * aspect), std::abs(dot(at, view.up)) / tanY);
     distance = std::max(distance, across - dot(at, view.forward));
   }

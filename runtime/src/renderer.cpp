@@ -111,6 +111,10 @@ class RendererImpl final : public Renderer {
     if (frame == nullptr || lookup.slot >= gpu::kGridSlots || !frame->grids_[lookup.slot].present) {
       return failure(ErrorCode::argument, "LookupInfo: the frame has no grid in this slot");
     }
+    // Every device takes 65535 groups; voxels.comp has 64 lookups in each.
+    if (lookup.count == 0 || lookup.count > 65535 * 64) {
+      return failure(ErrorCode::argument, "LookupInfo: count is outside of its range");
+    }
     const auto pipeline = passes_.pipeline(passKey(*frame, Shader::voxels, lookup.filter, Filter::none));
     if (!pipeline) return tl::unexpected(pipeline.error());
     const auto params = lookupParams(*frame, lookup.filter);

@@ -180,7 +180,7 @@ struct LookupInfo {
   Filter filter = Filter::nearest;
   VkDeviceAddress positions = 0;  // count times three floats, pack index space
   VkDeviceAddress values = 0;     // count floats are written
-  std::uint32_t count = 0;
+  std::uint32_t count = 0;              // 1 to 4 194 240
 };
 
 class Renderer {
