@@ -4,8 +4,6 @@
 
 #include <cctype>
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <set>
 #include <sstream>
@@ -13,26 +11,14 @@
 #include "billow/format/validate.h"
 #include "pack_image.h"
 #include "sample_pack.h"
+#include "spec_document.h"
 
 namespace billow {
 namespace {
 
 using namespace format;
-
-std::string specPath(const std::string& name) {
-  return std::string(BILLOW_SOURCE_DIR) + "/spec/" + name;
-}
-
-std::string readText(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
-// Compares a generated document with the one in the repository, or writes it when asked to.
-void expectDocument(const std::string& name, const std::string& text) {
-  if (std::getenv("BILLOW_UPDATE_SPEC") != nullptr) std::ofstream(specPath(name), std::ios::binary) << text;
-  EXPECT_EQ(readText(specPath(name)), text) << "run with BILLOW_UPDATE_SPEC=1 to rewrite spec/" << name;
-}
+using tests::expectDocument;
+using tests::readSpec;
 
 // ---- Byte tables
 
@@ -119,7 +105,7 @@ const std::map<std::string, Layout>& layouts() {
 // Byte tables of format.md: "### `Name` (N bytes)", then rows "| offset | size | `field` | ...".
 std::map<std::string, Layout> documentedLayouts() {
   std::map<std::string, Layout> all;
-  std::istringstream text(readText(specPath("format.md")));
+  std::istringstream text(readSpec("format.md"));
   std::string line, name;
   while (std::getline(text, line)) {
     if (line.rfind("### `", 0) == 0) {
@@ -198,7 +184,7 @@ TEST(Spec, CatalogueNamesAreUnique) {
 
 // Every rule about the pack itself is explained in format.md: its number stands in brackets there.
 TEST(Spec, EveryRuleIsInTheStandard) {
-  const std::string text = readText(specPath("format.md"));
+  const std::string text = readSpec("format.md");
   std::set<int> cited;
   for (std::size_t at = text.find('['); at != std::string::npos; at = text.find('[', at + 1)) {
     for (std::size_t i = at + 1; i < text.size() && std::isdigit(static_cast<unsigned char>(text[i])) != 0;) {
