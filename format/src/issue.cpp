@@ -84,7 +84,7 @@ constexpr IssueKind kCatalogue[] = {
     error(Rule::pageListPage, "page-list-page", "A listed page exists."),
     error(Rule::gridFrameNode5, "grid-frame-node5", "A grid frame's Node5 exists."),
     error(Rule::frameBlank, "frame-blank",
-          "A grid that the frame lacks, or whose frame is blank, has no Node5; a blank frame has no grids."),
+          "A grid frame that is not present has no Node5, and none of a blank frame is present."),
     error(Rule::infoUtf8, "info-utf8", "The provenance text is well-formed UTF-8."),
     error(Rule::pageCodec, "page-codec", "A page's codec is known."),
     error(

@@ -2,6 +2,7 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 
@@ -37,7 +38,15 @@ bool readStored(const Pack& pack, std::uint32_t number, std::vector<std::byte>& 
   return true;
 }
 
+// One frame of RFC 8878 is what a page holds: the library would also take several, and frames of its first versions.
+bool isOneFrame(std::span<const std::byte> stored) {
+  constexpr std::array<std::byte, 4> kFrameMagic = {std::byte{0x28}, std::byte{0xb5}, std::byte{0x2f}, std::byte{0xfd}};
+  return stored.size() >= kFrameMagic.size() && std::equal(kFrameMagic.begin(), kFrameMagic.end(), stored.begin()) &&
+         ZSTD_findFrameCompressedSize(stored.data(), stored.size()) == stored.size();
+}
+
 bool decompress(std::span<const std::byte> stored, std::vector<std::byte>& raw) {
+  if (!isOneFrame(stored)) return false;
   // A context is 150 KB: one a thread, not one a page.
   thread_local const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
   if (!context) return false;

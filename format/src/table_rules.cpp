@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "rules.h"
@@ -56,7 +57,7 @@ void checkLook(const LookRecord& look, const Place& place, IssueSink& sink) {
       }
     }
   };
-  constexpr float kMost = 3.4e38f;
+  constexpr float kMost = std::numeric_limits<float>::max();
   check("extinctionScale", std::span(&look.extinctionScale, 1), 0, kMost, false);
   check("albedo", look.albedo, 0, 1, false);
   check("anisotropy", std::span(&look.anisotropy, 1), -1, 1, true);

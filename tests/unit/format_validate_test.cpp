@@ -255,6 +255,36 @@ TEST(Rules, Volumes) {
   expectIssue(215, [](PackImage& i) { i.volumes[0].look.reserved[3] = 1; });
 }
 
+// What the standard allows at the edges of its ranges.
+TEST(Rules, EdgesOfWhatIsAllowed) {
+  PackImage image = PackImage::of(sample());
+  image.volumes[0].look.extinctionScale = std::numeric_limits<float>::max();
+  image.volumes[0].look.ambient[0] = -0.0f;  // not set: 0 by number
+  for (GridFrame& frame : image.gridFrames) {
+    if (frame.background == 0) frame.background = -0.0f;  // and tiles are +0
+  }
+  EXPECT_EQ(idsOf(image.assemble()), std::multiset<int>{});
+  EXPECT_EQ(loaderStop(image.assemble()), 0);
+}
+
+// No volumes at all, a volume without frames, and one without grids.
+TEST(Rules, NothingInIt) {
+  const PackImage nothing;
+  EXPECT_EQ(idsOf(nothing.assemble()), std::multiset<int>{});
+  EXPECT_EQ(loaderStop(nothing.assemble()), 0);
+  PackImage noFrames = PackImage::of(tests::smallestPack());
+  noFrames.volumes[0].frameCount = 0;
+  noFrames.frames.clear();
+  noFrames.gridFrames.clear();
+  EXPECT_EQ(idsOf(noFrames.assemble()), std::multiset<int>{});
+  PackImage noGrids = PackImage::of(tests::smallestPack());
+  noGrids.volumes[0].gridCount = 0;
+  noGrids.grids.clear();
+  noGrids.gridFrames.clear();
+  EXPECT_EQ(idsOf(noGrids.assemble()), std::multiset<int>{});
+  EXPECT_EQ(loaderStop(noGrids.assemble()), 0);
+}
+
 TEST(Rules, GridsAndFrames) {
   expectIssue(209, [](PackImage& i) { i.grids[0].volume = 1; });
   expectIssue(210, [](PackImage& i) { i.grids[0].role = kRoleCount; });
@@ -346,6 +376,25 @@ TEST(Rules, BrokenCompression) {
   tests::sealAll(bytes);
   EXPECT_EQ(idsOf(bytes), std::multiset<int>{302});
   EXPECT_EQ(loaderStop(bytes), 302);
+}
+
+// RFC 8878 has frames that a decoder passes over; a page is one frame that is not.
+TEST(Rules, OneZstdFrameAPage) {
+  const std::vector<std::byte> bytes = sample();
+  PackImage image = PackImage::of(bytes);
+  const Pack pack = *Pack::open(makeMemorySource(bytes));
+  std::vector<PageRecord> records(pack.pages().begin(), pack.pages().end());
+  ASSERT_EQ(records.size(), 1u);
+  ASSERT_EQ(records[0].codec, static_cast<std::uint32_t>(Codec::zstd));
+  std::vector<std::byte> content(records[0].storedSize);
+  ASSERT_TRUE(pack.source().read(getAt<SectionEntry>(bytes, sizeof(FileHeader)).offset, content));
+  EXPECT_EQ(idsOf(image.assemble(content, records)), std::multiset<int>{});
+  for (const unsigned byte : {0x50u, 0x2au, 0x4du, 0x18u, 0u, 0u, 0u, 0u}) content.push_back(std::byte(byte));
+  records[0].storedSize += 8;
+  ASSERT_LT(records[0].storedSize, records[0].rawSize);
+  records[0].checksum = tests::checksum(content);
+  EXPECT_EQ(idsOf(image.assemble(content, records)), std::multiset<int>{302});
+  EXPECT_EQ(loaderStop(image.assemble(content, records)), 302);
 }
 
 TEST(Rules, PageLists) {
