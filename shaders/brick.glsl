@@ -30,6 +30,20 @@ ivec3 slotCorner(uint slot, uint layoutBits, ivec3 slotTexels) {
 
 uint toInteger(float texel) { return uint(texel * 255.0 + 0.5); }
 
+// BC4 by integers, as format::decodeBc4Block has it: the nearest integer to what the block interpolates.
+uint bc4Texel(uint slot, uvec3 v) {
+  const uvec2 block = PairArray(params.atlas.zw).items[slot * 32u + v.z * 4u + (v.y >> 2) * 2u + (v.x >> 2)];
+  const uint bit = 16u + 3u * ((v.y & 3u) * 4u + (v.x & 3u));
+  const uint low = bit < 32u ? block.x >> bit : block.y >> (bit - 32u);
+  const uint index = (bit == 31u ? low | block.y << 1 : low) & 7u;
+  const uint a = block.x & 0xffu;
+  const uint b = block.x >> 8 & 0xffu;
+  if (index < 2u) return index == 0u ? a : b;
+  if (a > b) return (2u * ((8u - index) * a + (index - 1u) * b) + 7u) / 14u;
+  if (index > 5u) return index == 6u ? 0u : 255u;
+  return (2u * ((6u - index) * a + (index - 1u) * b) + 5u) / 10u;
+}
+
 // The stored integer of voxel v (each component 0 to 7).
 uint fetchTexel(uint brick, ivec3 v) {
   const uint encoding = brick >> kEncodingShift;
@@ -44,11 +58,11 @@ uint fetchTexel(uint brick, ivec3 v) {
     return toInteger(texel[v.z & 3]);
   }
   if (encoding <= kEncodingBc4X) {
-    return toInteger(texelFetch(atlasBc4, slotCorner(slot, params.atlas.y, ivec3(8)) + v, 0).r);
+    return bc4Texel(slot, uvec3(v));
   }
-  const uint low = toInteger(texelFetch(atlasR8, slotCorner(slot, params.atlas.z, ivec3(8)) + v, 0).r);
+  const uint low = toInteger(texelFetch(atlasR8, slotCorner(slot, params.atlas.y, ivec3(8)) + v, 0).r);
   if (encoding == kEncodingR8) return low;
-  return low | toInteger(texelFetch(atlasR8, slotCorner(slot + 1u, params.atlas.z, ivec3(8)) + v, 0).r) << 8;
+  return low | toInteger(texelFetch(atlasR8, slotCorner(slot + 1u, params.atlas.y, ivec3(8)) + v, 0).r) << 8;
 }
 
 bool isActive(uint g, uint mask, uint texel, ivec3 v) {

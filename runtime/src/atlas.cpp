@@ -14,9 +14,9 @@ struct ClassTraits {
   std::uint32_t blockBytes;
 };
 
-const ClassTraits& traits(AtlasClass which) {
-  static constexpr ClassTraits kTraits[kAtlasCount] = {
-      {VK_FORMAT_BC7_UNORM_BLOCK, 2, 4, 16}, {VK_FORMAT_BC4_UNORM_BLOCK, 8, 4, 8}, {VK_FORMAT_R8_UNORM, 8, 1, 1}};
+const ClassTraits& traits(BrickStore which) {
+  static constexpr ClassTraits kTraits[kAtlasCount] = {{VK_FORMAT_BC7_UNORM_BLOCK, 2, 4, 16},
+                                                       {VK_FORMAT_R8_UNORM, 8, 1, 1}};
   return kTraits[static_cast<std::uint32_t>(which)];
 }
 
@@ -39,7 +39,7 @@ void copyRows(const AtlasShape& shape, std::uint32_t slot, const std::byte* sour
   }
 }
 
-void writeDecoded(const AtlasShape& shape, const AtlasBrick& brick, std::span<std::byte> image) {
+void writeDecoded(const AtlasShape& shape, const StoredBrick& brick, std::span<std::byte> image) {
   format::Texels texels;
   format::decodeTexels(brick.encoding, brick.bytes, texels);
   std::byte raw[format::kBrickVoxels];
@@ -65,7 +65,7 @@ std::uint64_t AtlasShape::bytes() const {
   return (std::uint64_t{layers} << (xBits + yBits)) * blocks * kind.blockBytes;
 }
 
-std::optional<AtlasShape> atlasShape(AtlasClass which, std::uint32_t slots, std::uint32_t maxExtent) {
+std::optional<AtlasShape> atlasShape(BrickStore which, std::uint32_t slots, std::uint32_t maxExtent) {
   const std::uint32_t maxLayers = maxExtent / traits(which).depth;
   const std::uint32_t maxBits = static_cast<std::uint32_t>(std::bit_width(maxExtent / 8) - 1);
   // A layer is at most 1/16 of the atlas, which bounds the slots that stay unused in the last one.
@@ -78,8 +78,8 @@ std::optional<AtlasShape> atlasShape(AtlasClass which, std::uint32_t slots, std:
   return std::nullopt;
 }
 
-void writeSlot(const AtlasShape& shape, const AtlasBrick& brick, std::span<std::byte> image) {
-  if (shape.which == AtlasClass::r8 && brick.encoding < format::kEncodingR8) {
+void writeSlot(const AtlasShape& shape, const StoredBrick& brick, std::span<std::byte> image) {
+  if (shape.which == BrickStore::r8 && brick.encoding < format::kEncodingR8) {
     writeDecoded(shape, brick, image);
     return;
   }

@@ -1,4 +1,4 @@
-// Atlases: 3D images whose slots hold a brick each, 8x8x2 texels of BC7 or 8x8x8 of BC4 or R8.
+// Atlases: 3D images whose slots hold a brick each, 8x8x2 texels of BC7 or 8x8x8 of R8.
 #ifndef BILLOW_RUNTIME_ATLAS_H
 #define BILLOW_RUNTIME_ATLAS_H
 
@@ -13,7 +13,7 @@ namespace billow::runtime {
 
 // Slots along x and y are powers of two, so that a shader finds a slot by shifts.
 struct AtlasShape {
-  AtlasClass which = AtlasClass::r8;
+  BrickStore which = BrickStore::r8;
   std::uint32_t xBits = 0;
   std::uint32_t yBits = 0;
   std::uint32_t layers = 0;  // slots along z
@@ -24,11 +24,11 @@ struct AtlasShape {
 };
 
 // The smallest shape near a cube for `slots` >= 1 slots; nullopt where none fits into maxExtent texels an axis.
-std::optional<AtlasShape> atlasShape(AtlasClass which, std::uint32_t slots, std::uint32_t maxExtent);
+std::optional<AtlasShape> atlasShape(BrickStore which, std::uint32_t slots, std::uint32_t maxExtent);
 
 // Copies a brick into its slot of the image's bytes (tightly packed, as a buffer-to-image copy reads them). Bricks that
 // are blocks in an R8 atlas are decoded.
-void writeSlot(const AtlasShape& shape, const AtlasBrick& brick, std::span<std::byte> image);
+void writeSlot(const AtlasShape& shape, const StoredBrick& brick, std::span<std::byte> image);
 
 }  // namespace billow::runtime
 

@@ -36,33 +36,40 @@ Result<void> stageGrid(StagedFrame& staged, std::uint32_t slot, const format::Pa
   return {};
 }
 
+std::uint64_t blockBytes(const StagedFrame& staged) {
+  return std::uint64_t{staged.slots.slots(BrickStore::bc4)} *
+         kStoreSlotBytes[static_cast<std::size_t>(BrickStore::bc4)];
+}
+
 Result<void> shapeAtlases(StagedFrame& staged, std::uint32_t maxExtent) {
   for (std::uint32_t i = 0; i < kAtlasCount; ++i) {
-    const AtlasClass which = static_cast<AtlasClass>(i);
+    const BrickStore which = static_cast<BrickStore>(i);
     if (staged.slots.slots(which) == 0) continue;
     staged.shapes[i] = atlasShape(which, staged.slots.slots(which), maxExtent);
     if (!staged.shapes[i]) {
       return failure(ErrorCode::unsupported, "the frame has more bricks than the device's largest 3D image holds");
     }
   }
-  // Descriptors must be valid, so a frame of constants alone still has one atlas.
-  if (!staged.shapes[0] && !staged.shapes[1] && !staged.shapes[2]) {
-    staged.shapes[2] = AtlasShape{.which = AtlasClass::r8, .xBits = 0, .yBits = 0, .layers = 1};
+  staged.bufferBytes += blockBytes(staged);
+  // Descriptors must be valid, so a frame without atlas bricks still has one atlas.
+  if (!staged.shapes[0] && !staged.shapes[1]) {
+    staged.shapes[1] = AtlasShape{.which = BrickStore::r8, .xBits = 0, .yBits = 0, .layers = 1};
   }
   return {};
 }
 
 void countBytes(const StagedFrame& staged, FrameStats& stats) {
-  static constexpr std::uint64_t kSlotBytes[kAtlasCount] = {128, 256, 512};
   for (const auto& grid : staged.grids) {
     if (!grid) continue;
     stats.indexBytes += grid->indexBytes();
     stats.recordBytes += grid->records.size() * sizeof(format::Node3);
     stats.maskBytes += grid->masks.size() * sizeof(format::Mask3);
   }
-  for (std::uint32_t i = 0; i < kAtlasCount; ++i) {
-    stats.bricks[i] = staged.slots.slots(static_cast<AtlasClass>(i));
-    stats.brickBytes += stats.bricks[i] * kSlotBytes[i];
+  stats.bc7Bricks = staged.slots.slots(BrickStore::bc7);
+  stats.bc4Bricks = staged.slots.slots(BrickStore::bc4);
+  stats.r8Slots = staged.slots.slots(BrickStore::r8);
+  for (std::uint32_t i = 0; i < kStoreCount; ++i) {
+    stats.brickBytes += std::uint64_t{staged.slots.slots(static_cast<BrickStore>(i))} * kStoreSlotBytes[i];
   }
 }
 
@@ -94,10 +101,14 @@ void fillStaging(const StagedFrame& staged, const FrameObjects& objects) {
       at += aligned(section.size());
     }
   }
+  for (const StoredBrick& brick : staged.slots.bricks(BrickStore::bc4)) {
+    std::memcpy(bytes.subspan(at + std::uint64_t{brick.slot} * brick.bytes.size(), brick.bytes.size()).data(),
+                brick.bytes.data(), brick.bytes.size());
+  }
   for (std::uint32_t i = 0; i < kAtlasCount; ++i) {
     if (!staged.shapes[i]) continue;
     const std::span<std::byte> image = bytes.subspan(objects.offsets[i], staged.shapes[i]->bytes());
-    for (const AtlasBrick& brick : staged.slots.bricks(static_cast<AtlasClass>(i))) {
+    for (const StoredBrick& brick : staged.slots.bricks(static_cast<BrickStore>(i))) {
       writeSlot(*staged.shapes[i], brick, image);
     }
   }
@@ -187,6 +198,7 @@ Result<FrameObjects> makeFrameObjects(Device& device, const StagedFrame& staged)
   for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
     if (staged.grids[slot]) objects.frame->grids_[slot] = describe(*staged.grids[slot], at);
   }
+  objects.frame->blocks_ = at;
   fillStaging(staged, objects);
   return objects;
 }

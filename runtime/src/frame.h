@@ -33,10 +33,11 @@ class ResidentFrame final : public Frame {
   FrameStats stats_;
   std::uint64_t uploadValue_ = 0;
   std::array<ResidentGrid, gpu::kGridSlots> grids_;
-  Buffer buffer_;                  // tables, records, masks of all grids
+  Buffer buffer_;                  // tables, records, masks of all grids, then BC4 bricks
   std::uint64_t bufferBytes_ = 0;  // of it that are copied from staging
   std::array<Image3D, kAtlasCount> atlases_;
   std::array<AtlasShape, kAtlasCount> shapes_;
+  VkDeviceAddress blocks_ = 0;  // BC4 bricks, in buffer_
 };
 
 // A frame on the CPU: what will be copied, with the views that its bricks point into.

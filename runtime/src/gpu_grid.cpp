@@ -107,9 +107,9 @@ Index chooseIndex(const format::GridFrame& frame, Index wanted) {
 
 }  // namespace
 
-AtlasClass atlasClassOf(std::uint32_t encoding) {
-  if (encoding <= format::kEncodingBc7X) return AtlasClass::bc7;
-  return encoding <= format::kEncodingBc4X ? AtlasClass::bc4 : AtlasClass::r8;
+BrickStore storeOf(std::uint32_t encoding) {
+  if (encoding <= format::kEncodingBc7X) return BrickStore::bc7;
+  return encoding <= format::kEncodingBc4X ? BrickStore::bc4 : BrickStore::r8;
 }
 
 std::uint32_t BrickSlots::place(const GridView::Leaf& leaf) {
@@ -117,10 +117,10 @@ std::uint32_t BrickSlots::place(const GridView::Leaf& leaf) {
   if (encoding == format::kEncodingConstant) return 0;
   const auto [entry, fresh] = placed_.try_emplace(leaf.node.brick, 0);
   if (!fresh) return entry->second;
-  const AtlasClass own = atlasClassOf(encoding);
-  const bool decoded = (own == AtlasClass::bc7 && !bc7_) || (own == AtlasClass::bc4 && !bc4_);
+  const BrickStore own = storeOf(encoding);
+  const bool decoded = (own == BrickStore::bc7 && !bc7_) || (own == BrickStore::bc4 && !bc4_);
   const std::uint32_t stored = decoded ? format::kEncodingR8 : encoding;
-  const std::uint32_t which = static_cast<std::uint32_t>(atlasClassOf(stored));
+  const std::uint32_t which = static_cast<std::uint32_t>(storeOf(stored));
   bricks_[which].push_back({leaf.brick, encoding, slots_[which]});
   entry->second = stored << format::kEncodingShift | slots_[which];
   slots_[which] += stored == format::kEncodingR16 ? 2 : 1;

@@ -13,12 +13,16 @@
 
 namespace billow::runtime {
 
-enum class AtlasClass : std::uint32_t { bc7 = 0, bc4 = 1, r8 = 2 };
-inline constexpr std::uint32_t kAtlasCount = 3;
+// Where bricks lie on the GPU: BC7 and R8 in atlases, BC4 in a buffer whose blocks the shader decodes, for devices
+// differ by up to three steps of 255 in what their samplers make of BC4.
+enum class BrickStore : std::uint32_t { bc7 = 0, r8 = 1, bc4 = 2 };
+inline constexpr std::uint32_t kStoreCount = 3;
+inline constexpr std::uint32_t kAtlasCount = 2;  // the first ones
+inline constexpr std::uint32_t kStoreSlotBytes[kStoreCount] = {128, 512, 256};
 
-AtlasClass atlasClassOf(std::uint32_t encoding);
+BrickStore storeOf(std::uint32_t encoding);
 
-struct AtlasBrick {
+struct StoredBrick {
   std::span<const std::byte> bytes;  // in the pack's encoding; lives as long as its GridView
   std::uint32_t encoding;
   std::uint32_t slot;
@@ -33,13 +37,13 @@ class BrickSlots {
   // The record's brick word: encoding on the GPU << kEncodingShift | slot.
   std::uint32_t place(const format::GridView::Leaf& leaf);
 
-  std::span<const AtlasBrick> bricks(AtlasClass which) const { return bricks_[static_cast<std::uint32_t>(which)]; }
-  std::uint32_t slots(AtlasClass which) const { return slots_[static_cast<std::uint32_t>(which)]; }
+  std::span<const StoredBrick> bricks(BrickStore which) const { return bricks_[static_cast<std::uint32_t>(which)]; }
+  std::uint32_t slots(BrickStore which) const { return slots_[static_cast<std::uint32_t>(which)]; }
 
  private:
   bool bc7_, bc4_;
-  std::vector<AtlasBrick> bricks_[kAtlasCount];
-  std::uint32_t slots_[kAtlasCount] = {};
+  std::vector<StoredBrick> bricks_[kStoreCount];
+  std::uint32_t slots_[kStoreCount] = {};
   std::unordered_map<std::uint32_t, std::uint32_t> placed_;  // the pack's brick word -> ours
 };
 

@@ -25,7 +25,8 @@ Result<void> addFrame(const ResidentFrame& frame, const std::array<double, 3>& e
                       gpu::MarchParams& params) {
   std::uint32_t shifts[kAtlasCount];
   for (std::uint32_t i = 0; i < kAtlasCount; ++i) shifts[i] = frame.shapes_[i].xBits | frame.shapes_[i].yBits << 8;
-  params.atlas = {shifts[0], shifts[1], shifts[2], 0};
+  const gpu::uvec4 blocks = addresses(frame.blocks_, 0);
+  params.atlas = {shifts[0], shifts[1], blocks.x, blocks.y};
   for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
     if (!frame.grids_[slot].present) continue;
     const auto grid = gridParams(frame.grids_[slot], eye, filter);

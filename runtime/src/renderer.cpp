@@ -22,9 +22,7 @@ bool sampled3D(const Device& device, VkFormat format) {
 }
 
 Result<void> describeDevice(Device& device, BlockUse use) {
-  auto driver = begin<VkPhysicalDeviceVulkan12Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_PROPERTIES);
   auto properties = begin<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
-  properties.pNext = &driver;
   device.api.vkGetPhysicalDeviceProperties2(device.host.physicalDevice, &properties);
   if (properties.properties.apiVersion < VK_API_VERSION_1_3) {
     return failure(ErrorCode::unsupported, std::string(properties.properties.deviceName) + " has no Vulkan 1.3");
@@ -32,9 +30,7 @@ Result<void> describeDevice(Device& device, BlockUse use) {
   device.maxImageExtent3D = properties.properties.limits.maxImageDimension3D;
   device.api.vkGetPhysicalDeviceMemoryProperties(device.host.physicalDevice, &device.memory);
   device.bc7 = device.host.textureCompressionBc && sampled3D(device, VK_FORMAT_BC7_UNORM_BLOCK);
-  device.bc4 = device.host.textureCompressionBc && sampled3D(device, VK_FORMAT_BC4_UNORM_BLOCK);
-  // Mesa's software decoder truncates what BC4 interpolates, which is off by one from what the format promises.
-  if (driver.driverID == VK_DRIVER_ID_MESA_LLVMPIPE) device.bc4 = false;
+  device.bc4 = true;
   // In software a block is decoded anew for each texel that is read: six times as slow as R8.
   const bool software = properties.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
   if (use == BlockUse::decoded || (use == BlockUse::automatic && software)) device.bc7 = device.bc4 = false;

@@ -164,8 +164,8 @@ TEST_F(Upload, CountsTheBytesThatTheFormatPromises) {
   const format::GpuBytes promised = format::gpuBytes(pack.gridFrames()[0]);
   EXPECT_EQ(frame->stats().payload(), promised.total());
   EXPECT_EQ(frame->stats().maskBytes, promised.maskBytes);
-  EXPECT_EQ(frame->stats().bricks[0], 7u);
-  EXPECT_EQ(frame->stats().bricks[2], 3u);
+  EXPECT_EQ(frame->stats().bc7Bricks, 7u);
+  EXPECT_EQ(frame->stats().r8Slots, 3u);
   EXPECT_GE(frame->stats().allocatedBytes, frame->stats().payload());
   EXPECT_GE(renderer->bytesInUse(), before + frame->stats().allocatedBytes);
   gpu().waitIdle();

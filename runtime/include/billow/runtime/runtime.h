@@ -89,9 +89,11 @@ struct FrameStats {
   std::uint64_t indexBytes = 0;
   std::uint64_t recordBytes = 0;
   std::uint64_t maskBytes = 0;
-  std::uint64_t brickBytes = 0;      // payload of the atlases' used slots
+  std::uint64_t brickBytes = 0;      // of the slots in use
   std::uint64_t allocatedBytes = 0;  // what Vulkan was asked for, alignment and unused slots included
-  std::uint32_t bricks[3] = {};      // distinct, in the BC7, BC4 and R8 atlas (R16 counts two slots of R8)
+  std::uint32_t bc7Bricks = 0;       // distinct, that stayed BC7
+  std::uint32_t bc4Bricks = 0;       // distinct, that stayed BC4
+  std::uint32_t r8Slots = 0;         // of the R8 atlas; an R16 brick takes two
   std::uint64_t payload() const { return indexBytes + recordBytes + maskBytes + brickBytes; }
 };
 
@@ -180,7 +182,7 @@ struct LookupInfo {
   Filter filter = Filter::nearest;
   VkDeviceAddress positions = 0;  // count times three floats, pack index space
   VkDeviceAddress values = 0;     // count floats are written
-  std::uint32_t count = 0;              // 1 to 4 194 240
+  std::uint32_t count = 0;        // 1 to 4 194 240
 };
 
 class Renderer {
