@@ -29,6 +29,10 @@ constexpr int kFullEffort = 3;
 // Bytes that a stored mask adds beside a brick (spec: Mask3).
 constexpr std::uint32_t kMaskBytes = sizeof(format::Mask3);
 
+// Constant, R8, BC4, BC7 and BC7 again, and what their payloads take: room for them is made at once.
+constexpr std::size_t kUsualChoices = 5;
+constexpr std::size_t kUsualPayload = 512 + 256 + 128 + 128;
+
 // A tried encoding whose payload lies in the brick's arena.
 struct Tried {
   std::uint32_t encoding;
@@ -271,8 +275,11 @@ class GridChooser {
   void add(std::size_t i, const Candidate& candidate) {
     const std::uint32_t bytes = *format::brickBytes(candidate.encoding);
     const bool stored = counts_[i] != format::kBrickVoxels && !candidate.texelMask;
+    if (choices_[i].empty()) choices_[i].reserve(kUsualChoices);
     choices_[i].push_back({bytes + (stored ? kMaskBytes : 0), candidate.squaredError, candidate.maxError});
     BrickTrials& brick = bricks_[i];
+    if (brick.tried.empty()) brick.tried.reserve(kUsualChoices);
+    if (brick.arena.empty() && bytes != 0) brick.arena.reserve(kUsualPayload);
     brick.tried.push_back({candidate.encoding, candidate.texelMask, candidate.lo, candidate.scale,
                            static_cast<std::uint32_t>(brick.arena.size())});
     brick.arena.insert(brick.arena.end(), candidate.payload.begin(), candidate.payload.begin() + bytes);

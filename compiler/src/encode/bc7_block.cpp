@@ -10,10 +10,14 @@ namespace {
 
 class BitWriter {
  public:
+  // The lowest `count` bits of `value`, at most 32.
   void put(std::uint32_t value, std::uint32_t count) {
-    for (std::uint32_t i = 0; i < count; ++i, ++position_) {
-      words_[position_ >> 6] |= std::uint64_t{value >> i & 1u} << (position_ & 63);
-    }
+    if (count == 0) return;
+    const std::uint64_t bits = value & (0xffffffffu >> (32 - count));
+    const std::uint32_t shift = position_ & 63;
+    words_[position_ >> 6] |= bits << shift;
+    if (shift + count > 64) words_[1] |= bits >> (64 - shift);
+    position_ += count;
   }
   void store(std::byte* block) const {
     for (std::uint32_t i = 0; i < 16; ++i) block[i] = static_cast<std::byte>(words_[i >> 3] >> (8 * (i & 7)) & 0xff);

@@ -1,7 +1,7 @@
 // BC7 bricks: eight blocks of 16 texels, four slices of the packed axis in a texel's channels.
 #include "encode/bc7_block.h"
 #include "encode/stored_order.h"
-#include "encode/texel_range.h"
+#include "encode/wide/wide_encoder.h"
 
 namespace billow::compiler {
 namespace {
@@ -20,6 +20,50 @@ void fitWithMode6(const StoredBrick& stored, const Bc7Search& search, BrickFit& 
     fit.block[b] = fitMode6(stored.plane(b), search);
     fit.error += fit.block[b].error;
   }
+}
+
+// Where one packed axis alone is pursued, mode 6 is fitted to all blocks at once.
+bool isQuick(const Bc7Search& search) {
+  return !search.everyAxis;
+}
+
+std::uint32_t axisOf(std::uint32_t i) {
+  return format::packedAxis(format::kEncodingBc7Z + i);
+}
+
+// The sum of errors.
+float quickFit(const BrickTargets& targets, std::uint32_t axis, const Bc7Search& search, WideMode6& fit) {
+  WideBrick arranged;
+  wideEncoder().arrange(targets, axis, arranged);
+  return wideEncoder().fitMode6(arranged, search.passes, fit);
+}
+
+void take(const WideMode6& from, BrickFit& fit) {
+  fit.error = 0;
+  for (std::uint32_t b = 0; b < kBlocks; ++b) {
+    Bc7Fit& block = fit.block[b];
+    block = Bc7Fit{};
+    for (std::uint32_t c = 0; c < 4; ++c) {
+      block.line[0].first[c] = from.first[c][b];
+      block.line[0].second[c] = from.second[c][b];
+    }
+    for (std::uint32_t i = 0; i < 16; ++i) block.steps.step[i >> 2][i & 3] = from.step[i][b];
+    block.error = from.error[b];
+    fit.error += block.error;
+  }
+}
+
+// Of the three encodings the one that mode 6 serves best.
+std::uint32_t quickBestAxis(const BrickTargets& targets, const Bc7Search& search, BrickFit& fit) {
+  WideMode6 fits[3];
+  float errors[3];
+  std::uint32_t best = 0;
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    errors[i] = quickFit(targets, axisOf(i), search, fits[i]);
+    if (errors[i] < errors[best]) best = i;
+  }
+  take(fits[best], fit);
+  return best;
 }
 
 void improve(const StoredBrick& stored, const Bc7Search& search, BrickFit& fit) {
@@ -46,32 +90,41 @@ void store(const BrickSource& brick, std::uint32_t encoding, TexelRange range, c
   for (std::uint32_t b = 0; b < kBlocks; ++b) packBlock(fit.block[b], &out.payload[b * kBlockBytes]);
   format::Texels texels;
   format::decodeTexels(encoding, {out.payload.data(), kBlocks * kBlockBytes}, texels);
-  measure(brick, texels, out);
+  wideEncoder().measure(brick, texels, out);
 }
 
 }  // namespace
 
 void encodeBc7(const BrickSource& brick, std::uint32_t encoding, int effort, Candidate& out) {
   const BrickTargets targets(brick);
-  const StoredBrick stored(targets, format::packedAxis(encoding));
   const Bc7Search search = bc7Search(effort);
+  const std::uint32_t axis = format::packedAxis(encoding);
   BrickFit fit;
-  fitWithMode6(stored, search, fit);
-  improve(stored, search, fit);
+  if (isQuick(search)) {
+    WideMode6 mode6;
+    quickFit(targets, axis, search, mode6);
+    take(mode6, fit);
+  } else {
+    fitWithMode6(StoredBrick(targets, axis), search, fit);
+  }
+  improve(StoredBrick(targets, axis), search, fit);
   store(brick, encoding, targets.range, fit, out);
 }
 
 void encodeBc7BestAxis(const BrickSource& brick, int effort, Candidate& out) {
   const BrickTargets targets(brick);
-  const StoredBrick stored[3] = {StoredBrick(targets, 2), StoredBrick(targets, 1), StoredBrick(targets, 0)};
   const Bc7Search search = bc7Search(effort);
   BrickFit fit[3];
-  for (std::uint32_t i = 0; i < 3; ++i) fitWithMode6(stored[i], search, fit[i]);
-  if (search.everyAxis) {
-    for (std::uint32_t i = 0; i < 3; ++i) improve(stored[i], search, fit[i]);
-  } else {
-    const std::uint32_t promising = leastError(fit);
-    improve(stored[promising], search, fit[promising]);
+  if (isQuick(search)) {
+    const std::uint32_t promising = quickBestAxis(targets, search, fit[0]);
+    improve(StoredBrick(targets, axisOf(promising)), search, fit[0]);
+    store(brick, format::kEncodingBc7Z + promising, targets.range, fit[0], out);
+    return;
+  }
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    const StoredBrick stored(targets, axisOf(i));
+    fitWithMode6(stored, search, fit[i]);
+    improve(stored, search, fit[i]);
   }
   const std::uint32_t best = leastError(fit);
   store(brick, format::kEncodingBc7Z + best, targets.range, fit[best], out);

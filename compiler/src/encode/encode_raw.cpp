@@ -1,5 +1,5 @@
 // Bricks that store a texel a voxel as it is, and bricks that store none.
-#include "encode/texel_range.h"
+#include "encode/wide/wide_encoder.h"
 
 namespace billow::compiler {
 namespace {
@@ -7,7 +7,8 @@ namespace {
 // Fills `out` for texels of 8 or 16 bits. Where voxels are inactive, texel 0 is theirs and active ones start at 1.
 void encodeTexels(const BrickSource& brick, std::uint32_t encoding, std::uint32_t last, Candidate& out) {
   std::uint32_t first = brick.activeCount < format::kBrickVoxels ? 1 : 0;
-  const ValueRange values = activeRange(brick);
+  const WideEncoder& wide = wideEncoder();
+  const ValueRange values = wide.activeRange(brick);
   TexelRange range = coverRange(values, first, last);
   if (!(range.lo >= std::numeric_limits<float>::lowest())) {
     first = 0;
@@ -19,8 +20,8 @@ void encodeTexels(const BrickSource& brick, std::uint32_t encoding, std::uint32_
   out.scale = range.scale;
   TexelTargets targets;
   TexelWeights weights;
-  texelTargets(brick, range, first, last, targets);
-  texelWeights(brick, weights);
+  wide.texelTargets(brick, range, first, last, targets);
+  wide.texelWeights(brick, weights);
   format::Texels texels;
   for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) {
     const float active = targets[i] + 0.5f;
@@ -31,25 +32,30 @@ void encodeTexels(const BrickSource& brick, std::uint32_t encoding, std::uint32_
     out.payload[i] = static_cast<std::byte>(texel & 0xff);
     if (encoding == format::kEncodingR16) out.payload[format::kBrickVoxels + i] = static_cast<std::byte>(texel >> 8);
   }
-  measure(brick, texels, out);
+  wideEncoder().measure(brick, texels, out);
 }
 
 }  // namespace
 
 void encodeConstant(const BrickSource& brick, Candidate& out) {
   TexelWeights weights;
-  texelWeights(brick, weights);
-  double total = 0;
-  for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) {
-    total += weights[i] != 0.0f ? static_cast<double>((*brick.values)[i]) : 0.0;
+  wideEncoder().texelWeights(brick, weights);
+  // Independent sums, so that additions overlap; their order is fixed.
+  constexpr std::uint32_t kSums = 8;
+  double sums[kSums] = {};
+  for (std::uint32_t i = 0; i < format::kBrickVoxels; i += kSums) {
+    for (std::uint32_t j = 0; j < kSums; ++j) {
+      sums[j] += static_cast<double>(weights[i + j]) * static_cast<double>((*brick.values)[i + j]);
+    }
   }
+  const double total = ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]));
   out.encoding = format::kEncodingConstant;
   out.texelMask = false;
   out.lo = brick.activeCount == 0 ? 0.0f : static_cast<float>(total / brick.activeCount);
   out.scale = 0;
   format::Texels texels;
   texels.fill(0);
-  measure(brick, texels, out);
+  wideEncoder().measure(brick, texels, out);
 }
 
 void encodeR8(const BrickSource& brick, Candidate& out) {

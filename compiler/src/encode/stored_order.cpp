@@ -2,12 +2,6 @@
 
 namespace billow::compiler {
 
-BrickTargets::BrickTargets(const BrickSource& brick) : allActive(brick.activeCount == format::kBrickVoxels) {
-  range = coverRange(activeRange(brick), 0, 255);
-  texelTargets(brick, range, 0, 255, value);
-  texelWeights(brick, weight);
-}
-
 StoredBrick::StoredBrick(const BrickTargets& targets, std::uint32_t packedAxis) : allActive_(targets.allActive) {
   // Strides in voxelIndex of the stored x, y and z.
   const std::uint32_t strideX = packedAxis == 0 ? 1 : 64;
@@ -19,20 +13,10 @@ StoredBrick::StoredBrick(const BrickTargets& targets, std::uint32_t packedAxis) 
       for (std::uint32_t x = 0; x < 8; ++x, ++to) {
         const std::uint32_t from = x * strideX + y * strideY + z * strideZ;
         value_[to] = targets.value[from];
-        weight_[to] = targets.weight[from];
+        weight_[to] = allActive_ ? 1.0f : targets.weight[from];
       }
     }
   }
-}
-
-Scalars StoredBrick::scalars(std::uint32_t block) const {
-  const std::uint32_t corner = (block >> 2) * 64 + (block >> 1 & 1) * 32 + (block & 1) * 4;
-  Scalars scalars;
-  for (std::uint32_t r = 0; r < 4; ++r) {
-    scalars.value[r] = load(value_ + corner + 8 * r);
-    scalars.weight[r] = load(weight_ + corner + 8 * r);
-  }
-  return scalars;
 }
 
 Plane StoredBrick::plane(std::uint32_t block) const {

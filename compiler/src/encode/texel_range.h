@@ -12,8 +12,6 @@ namespace billow::compiler {
 struct ValueRange {
   float min = 0, max = 0;
 };
-// Of the active voxels; both 0 where none is active.
-ValueRange activeRange(const BrickSource& brick);
 
 // The map texel -> value of a candidate: values are lo + scale * texel.
 struct TexelRange {
@@ -24,17 +22,9 @@ struct TexelRange {
 // covered and is cut above. scale is 0 where the range is empty. lo may be -infinity where `first` is not 0.
 TexelRange coverRange(ValueRange range, std::uint32_t first, std::uint32_t last);
 
-// For every voxel where its value lies in the texel scale, clamped to [first, last]; inactive ones are `first`.
-using TexelTargets = std::array<float, format::kBrickVoxels>;  // by voxelIndex
-void texelTargets(const BrickSource& brick, TexelRange range, std::uint32_t first, std::uint32_t last,
-                  TexelTargets& targets);
-
-// 1 for an active voxel, 0 for an inactive one, by voxelIndex.
+// By voxelIndex: where a voxel's value lies in the texel scale, and 1 for an active voxel, 0 for an inactive one.
+using TexelTargets = std::array<float, format::kBrickVoxels>;
 using TexelWeights = std::array<float, format::kBrickVoxels>;
-void texelWeights(const BrickSource& brick, TexelWeights& weights);
-
-// Sets squaredError and maxError from what the reader will reconstruct from `texels`.
-void measure(const BrickSource& brick, const format::Texels& texels, Candidate& candidate);
 
 }  // namespace billow::compiler
 

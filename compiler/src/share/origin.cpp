@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 
 #include "share/share.h"
@@ -11,6 +12,25 @@ namespace {
 std::int64_t floorTo(std::int64_t value, std::int64_t step) {
   const std::int64_t down = value / step * step;
   return down > value ? down - step : down;
+}
+
+// By axis the coordinates at which a voxel is active, as bits.
+using Occupied = std::array<std::uint32_t, 3>;
+
+// Two words an x, four ys a word, eight zs a byte.
+Occupied occupiedBy(const format::Mask3& active) {
+  Occupied occupied = {};
+  for (std::uint32_t w = 0; w < 16; ++w) {
+    const std::uint32_t word = active.words[w];
+    if (word == 0) continue;
+    occupied[0] |= 1u << (w >> 1);
+    for (std::uint32_t y = 0; y < 4; ++y) {
+      const std::uint32_t row = word >> (8 * y) & 0xff;
+      if (row != 0) occupied[1] |= 1u << (4 * (w & 1) + y);
+      occupied[2] |= row;
+    }
+  }
+  return occupied;
 }
 
 }  // namespace
@@ -26,10 +46,11 @@ void activeBox(const ImportedGrid& grid, std::array<std::int64_t, 3>& min, std::
     for (std::size_t a = 0; a < 3; ++a) grow(a, tile.origin[a], std::int64_t{tile.origin[a]} + tile.dim - 1);
   }
   for (const Leaf& leaf : grid.leaves) {
-    for (std::uint32_t index = 0; index < format::kBrickVoxels; ++index) {
-      if (!format::maskBit(leaf.active, index)) continue;
-      const std::int64_t at[3] = {index >> 6, index >> 3 & 7, index & 7};
-      for (std::size_t a = 0; a < 3; ++a) grow(a, leaf.origin[a] + at[a], leaf.origin[a] + at[a]);
+    const Occupied occupied = occupiedBy(leaf.active);
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (occupied[a] == 0) continue;
+      grow(a, std::int64_t{leaf.origin[a]} + std::countr_zero(occupied[a]),
+           std::int64_t{leaf.origin[a]} + std::bit_width(occupied[a]) - 1);
     }
   }
 }

@@ -146,13 +146,23 @@ class TreeBuilder {
 
   // Mean, range and index of a node whose values are in values_.
   Summary finish3(Node3& node) {
-    float min = values_[0], max = values_[0];
-    double sum = 0;
-    for (const float value : values_) {
-      min = std::min(min, value);
-      max = std::max(max, value);
-      sum += static_cast<double>(value);
+    // Independent sums, so that additions overlap; their order is fixed.
+    constexpr std::size_t kSums = 8;
+    float lows[kSums], highs[kSums];
+    double sums[kSums] = {};
+    std::copy_n(values_.begin(), kSums, lows);
+    std::copy_n(values_.begin(), kSums, highs);
+    for (std::size_t i = 0; i < format::kBrickVoxels; i += kSums) {
+      for (std::size_t j = 0; j < kSums; ++j) {
+        const float value = values_[i + j];
+        lows[j] = value < lows[j] ? value : lows[j];
+        highs[j] = value > highs[j] ? value : highs[j];
+        sums[j] += static_cast<double>(value);
+      }
     }
+    const float min = *std::min_element(lows, lows + kSums);
+    const float max = *std::max_element(highs, highs + kSums);
+    const double sum = ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]));
     node.mean = std::clamp(static_cast<float>(sum / format::kBrickVoxels), min, max);
     const std::uint32_t index = intern(Stream::node3, &node, 1);
     nodes3_.push_back(index);
