@@ -114,7 +114,7 @@ std::map<std::string, Layout> documentedLayouts() {
       all[name].size = static_cast<std::size_t>(std::atoi(line.c_str() + end + 3));
     } else if (line.starts_with('#')) {
       name.clear();
-    } else if (!name.empty() && line.size() > 2 && std::isdigit(static_cast<unsigned char>(line[2])) != 0) {
+    } else if (!name.empty() && line.starts_with("| ") && std::isdigit(static_cast<unsigned char>(line[2])) != 0) {
       std::istringstream row(line);
       std::string bar, field;
       std::size_t offset = 0, size = 0;
