@@ -39,7 +39,7 @@ class SceneReader {
       const std::string childAt = at.empty() ? key : at + "." + key;
       if (member == members.end()) {
         std::string known;
-        for (const auto& [name, read] : members) known += (known.empty() ? "" : ", ") + name;
+        for (const auto& [name, read] : members) known.append(known.empty() ? "" : ", ").append(name);
         throw Refusal{kInvalid, fmt::format("{}: {} is not known; expected one of {}", path_, childAt, known)};
       }
       member->second(child, childAt);

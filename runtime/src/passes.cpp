@@ -103,7 +103,7 @@ Result<void> Passes::createSets() {
 Result<VkPipeline> Passes::pipeline(const PassKey& key) {
   const auto found = pipelines_.find(key);
   if (found != pipelines_.end()) return found->second;
-  const auto made = compile(key);
+  auto made = compile(key);
   if (made) pipelines_[key] = *made;
   return made;
 }

@@ -2,8 +2,8 @@
 #ifndef BILLOW_RUNTIME_PASSES_H
 #define BILLOW_RUNTIME_PASSES_H
 
-#include <compare>
 #include <map>
+#include <tuple>
 #include <vector>
 
 #include "frame.h"
@@ -19,7 +19,10 @@ struct PassKey {
   std::uint32_t filter = gpu::kFilterTrilinear;
   std::uint32_t shadow = gpu::kFilterTrilinear;
   std::uint32_t grids = 0;
-  auto operator<=>(const PassKey&) const = default;
+  bool operator<(const PassKey& other) const {
+    return std::tie(shader, index, filter, shadow, grids) <
+           std::tie(other.shader, other.index, other.filter, other.shadow, other.grids);
+  }
 };
 
 PassKey passKey(const ResidentFrame& frame, Shader shader, Filter filter, Filter shadow);
