@@ -77,9 +77,10 @@ void putSteps(const std::uint32_t steps[16], std::uint32_t bits, std::uint32_t a
 
 Bc7Search bc7Search(int effort) {
   static constexpr Bc7Search kSearches[] = {
-      // passes, rotations, partitions, mode4, allPBits, nudge, everyAxis
-      {2, 0, 0, false, false, false, false}, {2, 1, 1, true, false, false, false}, {3, 1, 2, true, false, false, false},
-      {3, 4, 4, true, true, false, true},    {4, 4, 10, true, true, true, true},   {8, 4, 64, true, true, true, true},
+      // passes, rotations, ranked, partitions, mode4, allPBits, nudge, everyAxis
+      {2, 0, 0, 0, false, false, false, false}, {2, 1, 16, 1, true, false, false, false},
+      {3, 1, 64, 2, true, false, false, false}, {3, 4, 64, 4, true, true, false, true},
+      {4, 4, 64, 10, true, true, true, true},   {8, 4, 64, 64, true, true, true, true},
   };
   return kSearches[std::clamp(effort, 0, 5)];
 }

@@ -25,7 +25,8 @@ struct Bc7Fit {
 struct Bc7Search {
   int passes = 2;          // of least squares and requantisation
   int rotations = 0;       // modes 4 and 5: none, the channel that mode 6 serves worst, or all four
-  int partitions = 0;      // of mode 7, the most promising first
+  int ranked = 0;          // partitions of mode 7 that are compared: the first so many, a multiple of 4, at most 64
+  int partitions = 0;      // of those that are tried, the most promising first
   bool mode4 = false;      // else mode 5 alone
   bool allPBits = false;   // every combination, not just the nearest
   bool nudge = false;      // each end of mode 6 by single steps

@@ -110,7 +110,8 @@ void sumRows(const Plane& plane, RowMoments& rows) {
   }
 }
 
-std::array<float, kPartitions> rankPartitions(const Plane& plane) {
+// Of the first `count` partitions; the others are out of the question.
+std::array<float, kPartitions> rankPartitions(const Plane& plane, std::uint32_t count) {
   RowMoments rows;
   sumRows(plane, rows);
   const auto moments = [&](std::uint32_t texels) {
@@ -119,7 +120,8 @@ std::array<float, kPartitions> rankPartitions(const Plane& plane) {
   const Moments whole = moments(0xffff);
   const LaneMoments all(whole, whole, whole, whole);
   std::array<float, kPartitions> residuals;
-  for (std::uint32_t p = 0; p < kPartitions; p += 4) {
+  residuals.fill(1e30f);
+  for (std::uint32_t p = 0; p < count; p += 4) {
     const std::uint16_t* texels = format::kBc7Partitions2 + p;
     const LaneMoments second(moments(texels[0]), moments(texels[1]), moments(texels[2]), moments(texels[3]));
     const Float4 both = residual(second) + residual(all - second);
@@ -161,7 +163,7 @@ void tryPartition(const Plane& plane, std::uint32_t partition, const Bc7Search& 
 }  // namespace
 
 void tryMode7(const Plane& plane, const Bc7Search& search, Bc7Fit& best) {
-  std::array<float, kPartitions> residuals = rankPartitions(plane);
+  std::array<float, kPartitions> residuals = rankPartitions(plane, static_cast<std::uint32_t>(search.ranked));
   for (int n = 0; n < search.partitions; ++n) {
     std::uint32_t next = 0;
     for (std::uint32_t p = 1; p < kPartitions; ++p) {

@@ -53,16 +53,22 @@ void take(const WideMode6& from, BrickFit& fit) {
   }
 }
 
-// Of the three encodings the one that mode 6 serves best.
+// Of the three encodings the one that mode 6 serves best after one pass, and its fit after all.
 std::uint32_t quickBestAxis(const BrickTargets& targets, const Bc7Search& search, BrickFit& fit) {
-  WideMode6 fits[3];
-  float errors[3];
+  WideBrick arranged[3];
+  WideMode6 mode6;
   std::uint32_t best = 0;
+  float least = 0;
   for (std::uint32_t i = 0; i < 3; ++i) {
-    errors[i] = quickFit(targets, axisOf(i), search, fits[i]);
-    if (errors[i] < errors[best]) best = i;
+    wideEncoder().arrange(targets, axisOf(i), arranged[i]);
+    const float error = wideEncoder().fitMode6(arranged[i], 1, mode6);
+    if (i == 0 || error < least) {
+      least = error;
+      best = i;
+    }
   }
-  take(fits[best], fit);
+  wideEncoder().fitMode6(arranged[best], search.passes, mode6);
+  take(mode6, fit);
   return best;
 }
 

@@ -136,11 +136,11 @@ Range leastSquares(const Blocks<kWeighted>& blocks, Wide count, Wide total, Rang
           select(solvable, (tv * ss - sv * st) * inverse, ends.high)};
 }
 
-// Least squares from several starts, since it only finds the optimum nearest to each: the whole range, and ranges that
-// leave out the outermost values.
+// Least squares from two starts, since it only finds the optimum nearest to each: the whole range, and one that leaves
+// out the outermost values.
 template <bool kWeighted>
 void refineEightSteps(const Blocks<kWeighted>& blocks, Range range, Fit& best) {
-  static constexpr float kInsets[] = {0.0f, 0.06f, 0.12f};
+  static constexpr float kInsets[] = {0.0f, 0.1f};
   Wide count = all(0.0f), total = all(0.0f);
   for (std::uint32_t i = 0; i < 16; ++i) {
     count += blocks.weigh(all(1.0f), i);
