@@ -3,29 +3,16 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <memory>
-#include <mutex>
 #include <nlohmann/json.hpp>
 
-#include "billow/format/writer.h"
 #include "command.h"
 #include "import_options.h"
 
 namespace billow::command {
 namespace {
-
-std::atomic<bool> interrupted{false};
-
-extern "C" void onInterrupt(int signal) {
-  // The first signal lets compile() stop and clean up by itself, a second ends the process at once.
-  if (!interrupted.exchange(true)) return;
-  format::removeUnfinishedFiles();
-  std::_Exit(128 + signal);
-}
 
 struct Arguments {
   std::vector<std::string> inputs;
@@ -105,10 +92,7 @@ int runCompile(const Arguments& arguments) {
   options.quality.gpuBudget = arguments.gpuBudget;
   options.quality.effort = arguments.effort;
   options.threads = arguments.threads;
-  options.interrupted = &interrupted;
   if (isatty(STDERR_FILENO) != 0) options.progress = drawProgress;
-  std::signal(SIGINT, onInterrupt);
-  std::signal(SIGTERM, onInterrupt);
   const compiler::CompileReport report = compiler::compile(arguments.inputs, arguments.output, options, printWarning);
   if (arguments.json) {
     fmt::print("{}\n", reportJson(report, arguments.output).dump(2));

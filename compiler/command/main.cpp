@@ -1,12 +1,15 @@
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <new>
 #include <string>
 #include <system_error>
 
+#include "billow/format/temp_file.h"
 #include "command.h"
 #ifdef BILLOW_WITH_COMPILER
 #include "stages.h"
@@ -14,6 +17,15 @@
 
 namespace billow::command {
 namespace {
+
+constexpr char kInterrupted[] = "billow: error: interrupted; nothing was written\n";
+
+// Outputs are whole or not at all, also here: what is unfinished goes, what was there before stays.
+extern "C" void onInterrupt(int) {
+  format::removeUnfinishedFiles();
+  [[maybe_unused]] const auto written = ::write(STDERR_FILENO, kInterrupted, sizeof(kInterrupted) - 1);
+  std::_Exit(kFile);
+}
 
 int complain(const std::string& what, int code) {
   fmt::print(stderr, "billow: error: {}\n", what);
@@ -50,6 +62,8 @@ int main(int argc, char** argv) {
   using namespace billow::command;
   // A file that grows past a limit is then a failed write with a message, as on a full disk, not a silent death.
   std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGINT, onInterrupt);
+  std::signal(SIGTERM, onInterrupt);
   CLI::App app{
       "billow turns OpenVDB sequences into packs that games play.\n"
       "Exit codes: 0 done, 1 command line, 2 a file cannot be read or written, 3 invalid input or pack,\n"

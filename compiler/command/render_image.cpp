@@ -5,20 +5,16 @@
 #include <ImfHeader.h>
 #include <ImfOutputFile.h>
 #include <ImfStdIO.h>
-#include <fcntl.h>
 #include <png.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstdio>
+#include <span>
 #include <sstream>
 #include <stdexcept>
-#include <system_error>
-#include <utility>
 #include <vector>
+
+#include "billow/format/temp_file.h"
 
 namespace billow::command {
 namespace {
@@ -39,50 +35,6 @@ float dither(std::uint32_t x, std::uint32_t y) {
   const float b = 52.9829189f * (a - std::floor(a));
   return b - std::floor(b);
 }
-
-std::system_error fileError(const std::string& path, const char* what) {
-  return std::system_error(errno, std::generic_category(), path + ": " + what);
-}
-
-// The unfinished file; removed unless it was renamed.
-class Unfinished {
- public:
-  explicit Unfinished(const std::string& path) : name_(path + ".XXXXXX") {
-    file_ = mkstemp(name_.data());
-    if (file_ < 0) throw fileError(path, "cannot be written");
-  }
-  Unfinished(const Unfinished&) = delete;
-  Unfinished& operator=(const Unfinished&) = delete;
-  ~Unfinished() {
-    if (file_ >= 0) ::close(file_);
-    if (!name_.empty()) ::unlink(name_.c_str());
-  }
-
-  void write(const std::string& bytes, const std::string& path) {
-    std::size_t done = 0;
-    while (done < bytes.size()) {
-      const ssize_t count = ::write(file_, bytes.data() + done, bytes.size() - done);
-      if (count < 0 && errno == EINTR) continue;
-      if (count <= 0) throw fileError(path, "cannot be written");
-      done += static_cast<std::size_t>(count);
-    }
-  }
-
-  void rename(const std::string& path) {
-    // mkstemp makes files that only their owner reads; a picture is as public as the umask says.
-    const mode_t mask = umask(0);
-    umask(mask);
-    const int file = std::exchange(file_, -1);
-    const bool closed = ::fchmod(file, 0666 & ~mask) == 0 && ::fsync(file) == 0;
-    if (::close(file) != 0 || !closed) throw fileError(path, "cannot be written");
-    if (std::rename(name_.c_str(), path.c_str()) != 0) throw fileError(path, "cannot be written");
-    name_.clear();
-  }
-
- private:
-  std::string name_;
-  int file_ = -1;
-};
 
 }  // namespace
 
@@ -146,9 +98,9 @@ std::string encodePng(const headless::Picture& picture, float exposure) {
 }
 
 void writeWhole(const std::string& path, const std::string& bytes) {
-  Unfinished file(path);
-  file.write(bytes, path);
-  file.rename(path);
+  format::TempFile file(path);
+  file.write(0, std::as_bytes(std::span(bytes)));
+  file.commit(bytes.size());
 }
 
 }  // namespace billow::command

@@ -122,11 +122,6 @@ class Compiler {
     tables_.volumes.push_back(record);
   }
 
-  void stopIfInterrupted() const {
-    if (options_.interrupted != nullptr && *options_.interrupted)
-      throw Error(Fault::file, "interrupted; nothing was written");
-  }
-
   std::string where(const Job& job, std::size_t grid) const {
     const PlannedVolume& volume = plan_.volumes[job.volume];
     const PlannedFrame& frame = volume.frames[job.frame];
@@ -139,13 +134,11 @@ class Compiler {
   }
 
   std::shared_ptr<EncodedFrame> encode(const Job& job) {
-    stopIfInterrupted();
     auto frame = std::make_shared<EncodedFrame>();
     frame->job = job;
     if (isHeld(job)) return frame;
     const PlannedVolume& volume = plan_.volumes[job.volume];
     frame->imported = importFrame(volume, volume.frames[job.frame], options_.import, warn_);
-    stopIfInterrupted();
     frame->chosen =
         chooseEncodings(frame->imported.grids, options_.quality, [&](std::size_t grid) { return where(job, grid); });
     return frame;

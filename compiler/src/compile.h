@@ -3,7 +3,6 @@
 #define BILLOW_COMPILER_COMPILE_H
 
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -21,8 +20,6 @@ struct CompileOptions {
   int zstdLevel = 3;
   // Called after each frame with the number done and the number in all, one call at a time.
   std::function<void(std::size_t done, std::size_t total)> progress;
-  // Set it (from a signal handler, say) to stop: compile() then throws Error(file) and leaves no output.
-  const std::atomic<bool>* interrupted = nullptr;
 };
 
 struct GridReport {

@@ -1,4 +1,4 @@
-#include "temp_file.h"
+#include "billow/format/temp_file.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -12,8 +12,6 @@
 #include <cstring>
 #include <system_error>
 #include <utility>
-
-#include "billow/format/writer.h"
 
 namespace billow::format {
 namespace {
@@ -69,17 +67,19 @@ TempFile::TempFile(std::string path) : path_(std::move(path)) {
 
 void TempFile::open() {
   const std::string base = temporary_;
+  int error = 0;
   // A file of the same name is left from a killed process that had our number: step aside, it isn't ours to remove.
   for (int attempt = 0; attempt < 100; ++attempt) {
     if (attempt > 0) temporary_ = fmt::format("{}-{}", base, attempt);
+    // Named before it exists, so that a signal at any moment leaves nothing behind.
+    slot_ = claimSlot(temporary_);
     descriptor_ = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (descriptor_ >= 0) {
-      slot_ = claimSlot(temporary_);
-      return;
-    }
-    if (errno != EEXIST) break;
+    if (descriptor_ >= 0) return;
+    error = errno;
+    releaseSlot(slot_);
+    if (error != EEXIST) break;
   }
-  fail(errno, "cannot be created");
+  fail(error, "cannot be created");
 }
 
 TempFile::~TempFile() {

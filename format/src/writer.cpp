@@ -8,9 +8,9 @@
 #include <system_error>
 #include <utility>
 
+#include "billow/format/temp_file.h"
 #include "hash.h"
 #include "page_compressor.h"
-#include "temp_file.h"
 
 namespace billow::format {
 namespace {

@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "billow/format/grid_view.h"
+#include "billow/format/temp_file.h"
 #include "billow/format/validate.h"
 #include "sample_pack.h"
 

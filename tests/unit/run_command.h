@@ -46,20 +46,22 @@ struct CommandResult {
   std::string out, err;
 };
 
-// `arguments` is shell text that follows `billow`; `prefix` goes before the command ("ulimit -f 1; ").
-inline CommandResult billow(const std::string& arguments, const std::string& prefix = "") {
-  const char* binary = std::getenv("BILLOW");
-  EXPECT_NE(binary, nullptr) << "BILLOW must name the built command";
-  if (binary == nullptr) return {};
+// Runs shell text with the built command as $BILLOW.
+inline CommandResult shell(const std::string& script) {
+  EXPECT_NE(std::getenv("BILLOW"), nullptr) << "BILLOW must name the built command";
   const TempFolder folder;
-  const std::string line =
-      prefix + "'" + binary + "' " + arguments + " >'" + (folder / "out") + "' 2>'" + (folder / "err") + "' </dev/null";
+  const std::string line = "{ " + script + "\n} >'" + (folder / "out") + "' 2>'" + (folder / "err") + "' </dev/null";
   const int status = std::system(line.c_str());
   CommandResult result;
   result.code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   result.out = readFile(folder / "out");
   result.err = readFile(folder / "err");
   return result;
+}
+
+// `arguments` follow `billow`; `prefix` goes before the command ("ulimit -f 1; ").
+inline CommandResult billow(const std::string& arguments, const std::string& prefix = "") {
+  return shell(prefix + "\"$BILLOW\" " + arguments);
 }
 
 inline std::string sampleFire() {

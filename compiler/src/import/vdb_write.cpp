@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
 
+#include "billow/format/temp_file.h"
 #include "import/vdb_file.h"
 
 namespace billow::compiler {
@@ -82,14 +82,6 @@ openvdb::GridBase::Ptr makeGrid(const VdbOutput& output) {
   return grid;
 }
 
-// The rename at the end would put a file in the place of a device or a folder.
-void checkTarget(const std::string& path) {
-  std::error_code ignored;
-  const auto status = std::filesystem::status(path, ignored);
-  if (!std::filesystem::exists(status) || std::filesystem::is_regular_file(status)) return;
-  throw Error(Fault::file, fmt::format("{}: cannot be written: it is there, and no regular file", path));
-}
-
 // OpenVDB does not always notice a full disk, so what was written is looked at before it gets its name.
 void checkWritten(const std::string& path) {
   const VdbFile file = listVdbFile(path);
@@ -99,23 +91,20 @@ void checkWritten(const std::string& path) {
 }  // namespace
 
 void writeVdb(const std::string& path, std::span<const VdbOutput> grids) {
-  checkTarget(path);
   openvdb::initialize();
   openvdb::GridPtrVec made;
   for (const VdbOutput& output : grids) made.push_back(makeGrid(output));
-  const std::string temporary = fmt::format("{}.{}.tmp", path, ::getpid());
+  format::TempFile target(path);
   try {
-    openvdb::io::File file(temporary);
+    openvdb::io::File file(target.temporaryPath());
     file.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
     file.write(made);
     file.close();
-    checkWritten(temporary);
-    std::filesystem::rename(temporary, path);
+    checkWritten(target.temporaryPath());
   } catch (const std::exception& error) {
-    std::error_code ignored;
-    std::filesystem::remove(temporary, ignored);
     throw Error(Fault::file, fmt::format("{}: cannot be written: {}", path, error.what()));
   }
+  target.commit(std::filesystem::file_size(target.temporaryPath()));
 }
 
 }  // namespace billow::compiler

@@ -25,10 +25,6 @@ struct PackTables {
   StringRef addString(const std::string& text);  // equal strings share
 };
 
-// Removes the temporary files of all writers that have not finished. Async-signal-safe: a program that may be
-// interrupted calls it from its handler of SIGINT and SIGTERM, then ends.
-void removeUnfinishedFiles() noexcept;
-
 // Writes to a temporary name beside `path`, renamed by finish(); the destructor removes what is unfinished.
 // Throws std::system_error (with the path) when the file cannot be written.
 class PackWriter {

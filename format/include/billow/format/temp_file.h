@@ -1,7 +1,7 @@
-// A file under construction: written under a temporary name beside its own, renamed when it is whole, removed
-// otherwise.
-#ifndef BILLOW_FORMAT_SRC_TEMP_FILE_H
-#define BILLOW_FORMAT_SRC_TEMP_FILE_H
+// A file under construction, of any kind: written under a temporary name beside its own, renamed when it is whole,
+// removed otherwise. Every output of billow is written through it.
+#ifndef BILLOW_FORMAT_TEMP_FILE_H
+#define BILLOW_FORMAT_TEMP_FILE_H
 
 #include <cstddef>
 #include <cstdint>
@@ -9,6 +9,10 @@
 #include <string>
 
 namespace billow::format {
+
+// Removes the temporary files that are not finished. Async-signal-safe: a program that may be interrupted calls it from
+// its handler of SIGINT and SIGTERM, then ends.
+void removeUnfinishedFiles() noexcept;
 
 // Every member throws std::system_error, with the final path in its message, when the system refuses.
 class TempFile {
@@ -19,6 +23,8 @@ class TempFile {
   ~TempFile();
 
   const std::string& path() const { return path_; }
+  // For a library that writes files by name; it may replace the content, not the file.
+  const std::string& temporaryPath() const { return temporary_; }
   void write(std::uint64_t offset, std::span<const std::byte> bytes);
   // Sets the size, flushes to the disk and gives the file its name.
   void commit(std::uint64_t size);
@@ -36,4 +42,4 @@ class TempFile {
 
 }  // namespace billow::format
 
-#endif  // BILLOW_FORMAT_SRC_TEMP_FILE_H
+#endif  // BILLOW_FORMAT_TEMP_FILE_H
