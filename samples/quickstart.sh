@@ -20,8 +20,8 @@ echo "== Validating"
 "$billow" validate "$out/fire.blw" && echo "$out/fire.blw is sound"
 "$billow" info "$out/fire.blw"
 echo "== Rendering"
-"$billow" render "$out/fire.blw" --frame 7-12 --size 480x480 -o "$out/fire.png"
-"$billow" render "$out/fire.blw" --frame 12 --size 480x480 -o "$out/fire.exr"
+"$billow" render "$out/fire.blw" --frame 7-12 --size 640x360 -o "$out/fire.png"
+"$billow" render "$out/fire.blw" --frame 12 --size 640x360 -o "$out/fire.exr"
 
 echo
 echo "Done. The pack is $out/fire.blw; the pictures are:"
