@@ -95,7 +95,8 @@ int runCompile(const Arguments& arguments) {
   if (isatty(STDERR_FILENO) != 0) options.progress = drawProgress;
   const compiler::CompileReport report = compiler::compile(arguments.inputs, arguments.output, options, printWarning);
   if (arguments.json) {
-    fmt::print("{}\n", reportJson(report, arguments.output).dump(2));
+    fmt::print("{}\n",
+               reportJson(report, arguments.output).dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   } else {
     printReport(report, arguments.output);
   }
@@ -117,9 +118,11 @@ void addCompile(CLI::App& app, Run& run) {
           ->add_option("--psnr", arguments->psnr,
                        "Least PSNR of every grid in every frame, over active voxels [45 unless --max-error or "
                        "--gpu-budget is given]")
+          ->check(finiteNumber())
           ->check(CLI::Range(1.0, 200.0))
           ->type_name("DB");
   command->add_option("--max-error", arguments->maxError, "Largest error of any active voxel, in the grid's own unit")
+      ->check(finiteNumber())
       ->check(CLI::PositiveNumber)
       ->type_name("E");
   command
@@ -129,7 +132,8 @@ void addCompile(CLI::App& app, Run& run) {
       ->excludes(psnr)
       ->type_name("BYTES");
   command->add_option("--fps", arguments->framesPerSecond, "Frames per second of the sequence [24, or the manifest's]")
-      ->check(CLI::PositiveNumber)
+      ->check(finiteNumber())
+      ->check(CLI::Range(0.001, 1e6))
       ->type_name("N");
   addImportOptions(*command, arguments->import);
   command->add_option("--effort", arguments->effort, "0 fastest to 9 smallest")

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <mutex>
 #include <set>
@@ -41,6 +42,16 @@ bool parseFrames(std::string_view text, compiler::ImportOptions& options) {
 }
 
 }  // namespace
+
+CLI::Validator finiteNumber() {
+  return CLI::Validator(
+      [](std::string& text) {
+        double number = 0;
+        const bool finite = CLI::detail::lexical_cast(text, number) && std::isfinite(number);
+        return finite ? std::string() : text + " is not a finite number";
+      },
+      "");
+}
 
 void addImportOptions(CLI::App& command, ImportArguments& arguments) {
   command.add_option("--grid", arguments.options.grids, "Take only this grid; may be given several times")

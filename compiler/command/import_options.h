@@ -22,6 +22,9 @@ void addImportOptions(CLI::App& command, ImportArguments& arguments);
 // Throws compiler::Error(commandLine) where a text cannot be understood.
 compiler::ImportOptions importOptions(const ImportArguments& arguments);
 
+// Refuses NaN and infinity, which CLI11's own ranges let pass.
+CLI::Validator finiteNumber();
+
 // "billow: warning: ..." on stderr, the same text once; may be called from any thread.
 void printWarning(const std::string& text);
 

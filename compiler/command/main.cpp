@@ -18,7 +18,7 @@
 namespace billow::command {
 namespace {
 
-constexpr char kInterrupted[] = "billow: error: interrupted; nothing was written\n";
+constexpr char kInterrupted[] = "billow: error: interrupted; no unfinished file is left\n";
 
 // Outputs are whole or not at all, also here: what is unfinished goes, what was there before stays.
 extern "C" void onInterrupt(int) {
@@ -62,8 +62,9 @@ int main(int argc, char** argv) {
   using namespace billow::command;
   // A file that grows past a limit is then a failed write with a message, as on a full disk, not a silent death.
   std::signal(SIGXFSZ, SIG_IGN);
-  std::signal(SIGINT, onInterrupt);
-  std::signal(SIGTERM, onInterrupt);
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
+    if (std::signal(number, onInterrupt) == SIG_IGN) std::signal(number, SIG_IGN);  // nohup stays in force
+  }
   CLI::App app{
       "billow turns OpenVDB sequences into packs that games play.\n"
       "Exit codes: 0 done, 1 command line, 2 a file cannot be read or written, 3 invalid input or pack,\n"
@@ -89,5 +90,8 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kDone : kCommandLine;
   }
-  return runGuarded(run);
+  const int code = runGuarded(run);
+  // What a full disk kept from standard output must not pass for success.
+  const bool flushed = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  return flushed || code != kDone ? code : complain("standard output cannot be written", kFile);
 }

@@ -202,11 +202,30 @@ class Compiler {
 
 }  // namespace
 
+namespace {
+
+// The rename at the end would put the pack in the source's place.
+void refuseToReplaceInputs(const Plan& plan, const std::string& output) {
+  for (const PlannedVolume& volume : plan.volumes) {
+    for (const PlannedFrame& frame : volume.frames) {
+      for (const std::string& file : frame.files) {
+        std::error_code absent;
+        if (!std::filesystem::equivalent(file, output, absent)) continue;
+        throw Error(Fault::commandLine, output + ": is an input of this compile; give the pack another name");
+      }
+    }
+  }
+}
+
+}  // namespace
+
 CompileReport compile(const std::vector<std::string>& inputs, const std::string& output, const CompileOptions& options,
                       const Warn& warn) {
   std::optional<tbb::global_control> limit;
   if (options.threads != 0) limit.emplace(tbb::global_control::max_allowed_parallelism, options.threads);
-  CompileReport report = Compiler(output, options, warn, planInputs(inputs, options.import, warn)).run();
+  Plan plan = planInputs(inputs, options.import, warn);
+  refuseToReplaceInputs(plan, output);
+  CompileReport report = Compiler(output, options, warn, std::move(plan)).run();
   report.fileBytes = std::filesystem::file_size(output);
   return report;
 }

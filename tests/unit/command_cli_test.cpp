@@ -1,6 +1,7 @@
 // The command line as users and build farms meet it: exit codes, outputs whole or not at all, JSON that is only JSON.
 #include <gtest/gtest.h>
 
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "run_command.h"
@@ -133,15 +134,49 @@ TEST(Cli, TheErrorAskedForHolds) {
 TEST(Cli, TheGpuBudgetHolds) {
   const TempFolder folder;
   const std::string pack = folder / "out.blw";
-  const CommandResult result =
-      billow("compile " + quoted(sampleFire()) + " --gpu-budget 100000 --json -o " + quoted(pack));
+  constexpr std::uint64_t kBudget = 100000;
+  const CommandResult result = billow("compile " + quoted(sampleFire()) + " --gpu-budget 100000 -o " + quoted(pack));
   ASSERT_EQ(result.code, 0) << result.err;
-  const auto report = nlohmann::json::parse(result.out);
-  std::uint64_t total = 0;  // of each grid's largest frame: at least that of any frame
-  for (const auto& grid : report["grids"]) total += grid["largestFrameGpuBytes"].get<std::uint64_t>();
-  EXPECT_LE(total, 110000u);
-  EXPECT_GE(total, 60000u);
+  const auto info = nlohmann::json::parse(billow("info --json " + quoted(pack)).out);
+  std::map<int, std::uint64_t> frames;
+  for (const auto& grid : info["volumes"][0]["grids"]) {
+    for (const auto& frame : grid["frames"]) {
+      frames[frame["frame"].get<int>()] += frame["gpuBytes"]["total"].get<std::uint64_t>();
+    }
+  }
+  ASSERT_EQ(frames.size(), 6u);
+  for (const auto& [number, bytes] : frames) {
+    EXPECT_LE(bytes, kBudget) << "frame " << number;
+    EXPECT_GE(bytes, kBudget * 9 / 10) << "frame " << number;
+  }
   EXPECT_EQ(billow("compile " + quoted(sampleFire()) + " --gpu-budget 1000 -o " + quoted(pack)).code, 3);
+  const CommandResult both =
+      billow("compile " + quoted(sampleFire()) + " --gpu-budget 10MB --max-error 1e-12 -o " + quoted(pack));
+  EXPECT_EQ(both.code, 3);
+  EXPECT_NE(both.err.find("the error asked for is out of reach"), std::string::npos) << both.err;
+}
+
+TEST(Cli, NumbersThatAreNoneAreRefused) {
+  for (const char* option : {"--psnr nan", "--psnr inf", "--max-error nan", "--fps nan", "--fps 1e-50"}) {
+    EXPECT_EQ(billow("compile " + quoted(sampleFire()) + " -o /nowhere/out.blw " + option).code, 1) << option;
+  }
+}
+
+TEST(Cli, AnInputIsNeverReplaced) {
+  const TempFolder folder;
+  const std::string input = folder / "fire_0012.vdb";
+  std::filesystem::copy_file(std::string(BILLOW_SOURCE_DIR) + "/samples/fire/fire_0012.vdb", input);
+  const std::string before = readFile(input);
+  const CommandResult result = billow("compile " + quoted(input) + " -o " + quoted(input));
+  EXPECT_EQ(result.code, 1) << result.err;
+  EXPECT_EQ(readFile(input), before);
+}
+
+TEST(Cli, AFullStandardOutputExitsWithTwo) {
+  const TempFolder folder;
+  const std::string pack = folder / "out.blw";
+  ASSERT_EQ(billow("compile " + quoted(sampleFire()) + " --frames 7 -o " + quoted(pack)).code, 0);
+  EXPECT_EQ(shell("\"$BILLOW\" info --json " + quoted(pack) + " >/dev/full").code, 2);
 }
 
 }  // namespace

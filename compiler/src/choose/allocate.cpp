@@ -68,6 +68,7 @@ std::optional<Allocation> allocate(std::span<const std::vector<Choice>> bricks, 
   };
   double error = total();
   std::size_t next = 0;
+  if (!(budget >= 0)) return std::nullopt;  // NaN too
   // The running sum drifts by rounding, so it is taken afresh before the answer is believed.
   for (;; error = total()) {
     for (; error > budget && next < steps.size(); ++next) {

@@ -301,21 +301,17 @@ class GridChooser {
   bool r16Tried_ = false;
 };
 
-}  // namespace
-
-namespace {
-
 // The best PSNR, the same for every grid, at which the frame fits the budget; bisected on 1/64 dB. Sharing one PSNR is
-// one Lagrange multiplier over errors relative to each grid's range.
+// one Lagrange multiplier over errors relative to each grid's range. `tileBytes`: what grids without bricks need.
 std::vector<std::vector<std::uint32_t>> fitBudget(std::vector<std::unique_ptr<GridChooser>>& choosers,
-                                                  const Quality& quality,
+                                                  const Quality& quality, std::uint64_t tileBytes,
                                                   const std::function<std::string(std::size_t)>& where) {
   constexpr int kSteps = 64 * 64;  // up to 64 dB, above what 8 bits a voxel reach
   std::vector<std::vector<std::uint32_t>> best;
   std::uint64_t least = 0;
   const auto fits = [&](int step) {
     std::vector<std::vector<std::uint32_t>> chosen(choosers.size());
-    std::uint64_t bytes = 0;
+    std::uint64_t bytes = tileBytes;
     for (std::size_t g = 0; g < choosers.size(); ++g) {
       if (!choosers[g]) continue;
       auto solved = choosers[g]->solve(step / 64.0);
@@ -328,6 +324,10 @@ std::vector<std::vector<std::uint32_t>> fitBudget(std::vector<std::unique_ptr<Gr
     best = std::move(chosen);
     return true;
   };
+  // Whatever the budget, the largest error must be reachable: that is said first, and of the right grid.
+  for (std::size_t g = 0; g < choosers.size(); ++g) {
+    if (choosers[g]) choosers[g]->solveOrThrow(0.0, where(g));
+  }
   if (!fits(0)) {
     throw Error(Fault::input, fmt::format("{}: --gpu-budget {} is out of reach: the frame needs {} bytes at the least",
                                           where(0), *quality.gpuBudget, least));
@@ -346,8 +346,12 @@ std::vector<std::vector<std::uint32_t>> fitBudget(std::vector<std::unique_ptr<Gr
 std::vector<ChosenGrid> chooseEncodings(std::span<const ImportedGrid> grids, const Quality& quality,
                                         const std::function<std::string(std::size_t)>& where) {
   std::vector<std::unique_ptr<GridChooser>> choosers(grids.size());
+  std::uint64_t tileBytes = 0;
   for (std::size_t g = 0; g < grids.size(); ++g) {
-    if (!grids[g].present || grids[g].leaves.empty()) continue;
+    if (!grids[g].present) continue;
+    if (grids[g].leaves.empty() && !grids[g].tiles.empty())
+      tileBytes += format::gpuBytes(shape(grids[g], where(g))).total();
+    if (grids[g].leaves.empty()) continue;
     choosers[g] = std::make_unique<GridChooser>(grids[g], quality);
     choosers[g]->tryConstants();
     choosers[g]->settleQuietBricks(quality.psnr);
@@ -357,7 +361,7 @@ std::vector<ChosenGrid> chooseEncodings(std::span<const ImportedGrid> grids, con
     if (quality.maxError) choosers[g]->tryR16();
   }
   std::vector<std::vector<std::uint32_t>> chosen(grids.size());
-  if (quality.gpuBudget) chosen = fitBudget(choosers, quality, where);
+  if (quality.gpuBudget) chosen = fitBudget(choosers, quality, tileBytes, where);
   std::vector<ChosenGrid> result(grids.size());
   for (std::size_t g = 0; g < grids.size(); ++g) {
     if (!choosers[g]) continue;

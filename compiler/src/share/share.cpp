@@ -124,9 +124,6 @@ class TreeBuilder {
     const auto payloadBytes = static_cast<std::uint32_t>(brick.payload.size());
     std::uint32_t unit = 0;
     if (payloadBytes != 0) unit = intern(Stream::unit, brick.payload.data(), payloadBytes / 128);
-    if (unit > format::kBrickUnitMask) {
-      throw Error(Fault::input, where_ + ": the pack would hold more than 32 GiB of bricks; split the sequence");
-    }
     node.brick = brick.encoding << format::kEncodingShift | unit;
     const bool full = std::all_of(std::begin(leaf.active.words), std::end(leaf.active.words),
                                   [](std::uint32_t word) { return word == ~0u; });
