@@ -1,7 +1,6 @@
 #include "compile.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
@@ -10,6 +9,7 @@
 
 #include "command.h"
 #include "import_options.h"
+#include "progress.h"
 
 namespace billow::command {
 namespace {
@@ -26,14 +26,6 @@ struct Arguments {
   unsigned threads = 0;
   bool json = false;
 };
-
-void drawProgress(std::size_t done, std::size_t total) {
-  constexpr std::size_t kWidth = 32;
-  const std::size_t filled = done * kWidth / total;
-  fmt::print(stderr, "\r[{:#<{}}{:.<{}}] {}/{} frames{}", "", filled, "", kWidth - filled, done, total,
-             done == total ? "\n" : "");
-  std::fflush(stderr);
-}
 
 std::string psnrText(double psnr) {
   return std::isfinite(psnr) ? fmt::format("{:.2f} dB", psnr) : "exact";
@@ -92,7 +84,7 @@ int runCompile(const Arguments& arguments) {
   options.quality.gpuBudget = arguments.gpuBudget;
   options.quality.effort = arguments.effort;
   options.threads = arguments.threads;
-  if (isatty(STDERR_FILENO) != 0) options.progress = drawProgress;
+  options.progress = drawProgress;
   const compiler::CompileReport report = compiler::compile(arguments.inputs, arguments.output, options, printWarning);
   if (arguments.json) {
     fmt::print("{}\n",

@@ -9,6 +9,8 @@
 #include <set>
 #include <string_view>
 
+#include "progress.h"
+
 namespace billow::command {
 namespace {
 
@@ -90,7 +92,7 @@ void printWarning(const std::string& text) {
   static std::set<std::string> said;
   const std::lock_guard lock(mutex);
   if (!said.insert(text).second) return;
-  fmt::print(stderr, "billow: warning: {}\n", text);
+  printLine("billow: warning: " + text);
 }
 
 }  // namespace billow::command

@@ -11,6 +11,7 @@
 
 #include "billow/format/temp_file.h"
 #include "command.h"
+#include "progress.h"
 #ifdef BILLOW_WITH_COMPILER
 #include "stages.h"
 #endif
@@ -28,7 +29,7 @@ extern "C" void onInterrupt(int) {
 }
 
 int complain(const std::string& what, int code) {
-  fmt::print(stderr, "billow: error: {}\n", what);
+  printLine("billow: error: " + what);
   return code;
 }
 

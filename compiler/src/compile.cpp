@@ -64,6 +64,7 @@ class Compiler {
   }
 
   CompileReport run() {
+    if (options_.progress) options_.progress(0, jobs_.size());
     std::size_t next = 0;
     tbb::parallel_pipeline(kFramesInFlight,
                            tbb::make_filter<void, Job>(tbb::filter_mode::serial_in_order,

@@ -18,7 +18,7 @@ struct CompileOptions {
   Quality quality;
   unsigned threads = 0;  // 0: as many as the machine has
   int zstdLevel = 3;
-  // Called after each frame with the number done and the number in all, one call at a time.
+  // Called before the first frame and after each with the number done and the number in all, one call at a time.
   std::function<void(std::size_t done, std::size_t total)> progress;
 };
 
