@@ -78,6 +78,14 @@ Result<std::unique_ptr<ByteSource>> openFileSource(const std::string& path) {
   return std::make_unique<FileSource>(descriptor, static_cast<std::uint64_t>(status.st_size));
 }
 
+Result<std::string> readTextFile(const std::string& path) {
+  const auto source = openFileSource(path);
+  if (!source) return tl::make_unexpected(source.error());
+  std::string text((*source)->size(), '\0');
+  if (!(*source)->read(0, std::as_writable_bytes(std::span(text)))) return refused(EIO);
+  return text;
+}
+
 std::unique_ptr<ByteSource> makeMemorySource(std::vector<std::byte> bytes) {
   return std::make_unique<MemorySource>(std::move(bytes));
 }
