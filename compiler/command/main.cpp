@@ -59,21 +59,10 @@ int reportIssue(const std::string& path, const format::Issue& issue) {
 
 }  // namespace billow::command
 
-int main(int argc, char** argv) {
+namespace {
+
+void addCommands(CLI::App& app, billow::command::Run& run) {
   using namespace billow::command;
-  // A file that grows past a limit is then a failed write with a message, as on a full disk, not a silent death.
-  std::signal(SIGXFSZ, SIG_IGN);
-  for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
-    if (std::signal(number, onInterrupt) == SIG_IGN) std::signal(number, SIG_IGN);  // nohup stays in force
-  }
-  CLI::App app{
-      "billow turns OpenVDB sequences into packs that games play.\n"
-      "Exit codes: 0 done, 1 command line, 2 a file cannot be read or written, 3 invalid input or pack,\n"
-      "4 no usable GPU or GPU failure, 5 billow's own fault."};
-  app.name("billow");
-  app.set_version_flag("--version", "billow " BILLOW_VERSION);
-  app.require_subcommand(1);
-  Run run;
 #ifdef BILLOW_WITH_COMPILER
   addCompile(app, run);
 #endif
@@ -86,6 +75,24 @@ int main(int argc, char** argv) {
 #ifdef BILLOW_WITH_RUNTIME
   addRender(app, run);
 #endif
+}
+
+int runCommandLine(int argc, char** argv) {
+  using namespace billow::command;
+  CLI::App app{
+      "billow turns OpenVDB sequences into packs that games play.\n"
+      "Exit codes: 0 done, 1 command line, 2 a file cannot be read or written, 3 invalid input or pack,\n"
+      "4 no usable GPU or GPU failure, 5 billow's own fault."};
+  app.name("billow");
+  app.set_version_flag("--version", "billow " BILLOW_VERSION);
+  app.require_subcommand(1);
+  Run run;
+  addCommands(app, run);
+  // Without arguments, what a newcomer wants to see first.
+  if (argc <= 1) {
+    fmt::print(stderr, "{}", app.help());
+    return kCommandLine;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -95,4 +102,20 @@ int main(int argc, char** argv) {
   // What a full disk kept from standard output must not pass for success.
   const bool flushed = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
   return flushed || code != kDone ? code : complain("standard output cannot be written", kFile);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace billow::command;
+  // A file that grows past a limit is then a failed write with a message, as on a full disk, not a silent death.
+  std::signal(SIGXFSZ, SIG_IGN);
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
+    if (std::signal(number, onInterrupt) == SIG_IGN) std::signal(number, SIG_IGN);  // nohup stays in force
+  }
+  try {
+    return runCommandLine(argc, argv);
+  } catch (...) {
+    return kInternal;
+  }
 }
