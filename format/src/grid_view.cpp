@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "grid_walk.h"
+#include "guard.h"
 
 namespace billow::format {
 namespace {
@@ -196,13 +197,15 @@ struct GridLoader {
 };
 
 Result<GridView> GridView::load(const Pack& pack, const GridFrame& gridFrame) {
-  GridView view;
-  view.frame_ = gridFrame;
-  FirstError sink;
-  GridLoader loader{.pack = pack, .view = view, .sink = sink, .original = &gridFrame};
-  if (!loader.run()) return tl::make_unexpected(std::move(sink.issue()));
-  view.cells_ = cellBox(gridFrame);
-  return view;
+  return guarded<GridView>([&]() -> Result<GridView> {
+    GridView view;
+    view.frame_ = gridFrame;
+    FirstError sink;
+    GridLoader loader{.pack = pack, .view = view, .sink = sink, .original = &gridFrame};
+    if (!loader.run()) return tl::make_unexpected(std::move(sink.issue()));
+    view.cells_ = cellBox(gridFrame);
+    return view;
+  });
 }
 
 float GridView::voxel(std::int64_t x, std::int64_t y, std::int64_t z) const {

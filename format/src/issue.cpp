@@ -28,6 +28,7 @@ constexpr IssueKind kCatalogue[] = {
     error(Rule::tableLimit, "table-limit", "A table is no longer than this reader holds in memory (1 GiB)."),
     error(Rule::frameLimit, "frame-limit",
           "The pages of a grid frame are no more than this reader holds in memory (4 GiB)."),
+    error(Rule::memory, "memory", "The system gives the reader the memory and the threads that it asks for."),
 
     error(Rule::tooShort, "too-short", "A pack is at least as long as its header."),
     error(Rule::magic, "magic", "A pack begins with the magic bytes."),
@@ -70,13 +71,16 @@ constexpr IssueKind kCatalogue[] = {
           "A frame has no reserved flags, is not both held and blank, and is not held when it is the first."),
     error(Rule::tableReserved, "table-reserved", "Reserved fields of the tables are zero."),
     error(Rule::gridFrameFlags, "grid-frame-flags", "A grid frame has no reserved flags."),
-    error(Rule::transform, "transform", "An index-to-world transform is finite and invertible."),
+    error(Rule::transform, "transform",
+          "An index-to-world transform is finite, and so are its determinant and the reciprocal of that."),
     error(Rule::gridFrameValues, "grid-frame-values",
           "A grid frame's values are finite, its ranges are ordered and hold the background, its errors are not "
           "negative."),
     error(Rule::gridFrameBox, "grid-frame-box",
           "The active box lies in [0, 4095] on every axis, and is empty exactly if no voxel is active."),
-    error(Rule::gridFrameOrigin, "grid-frame-origin", "A grid frame's origin is a multiple of 8 on every axis."),
+    error(Rule::gridFrameOrigin, "grid-frame-origin",
+          "A grid frame's origin is a multiple of 8 on every axis, and no source index of its active box exceeds 2^31 "
+          "- 1."),
     error(Rule::gridFrameEmpty, "grid-frame-empty",
           "A grid frame without a Node5 has no voxels, pages, nodes or bricks."),
     error(Rule::pageListRange, "page-list-range", "A grid frame's page list lies inside the page lists."),

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "guard.h"
 #include "hash.h"
 #include "rules.h"
 
@@ -80,17 +81,21 @@ TableView PackReader::view(const Pack& pack) {
 }
 
 Result<Pack> Pack::open(std::unique_ptr<ByteSource> source) {
-  Pack pack;
-  FileHeader header{};
-  FirstError sink;
-  if (!PackReader::read(std::move(source), pack, header, sink)) return tl::make_unexpected(std::move(sink.issue()));
-  return pack;
+  return guarded<Pack>([&]() -> Result<Pack> {
+    Pack pack;
+    FileHeader header{};
+    FirstError sink;
+    if (!PackReader::read(std::move(source), pack, header, sink)) return tl::make_unexpected(std::move(sink.issue()));
+    return pack;
+  });
 }
 
 Result<Pack> Pack::openFile(const std::string& path) {
-  Result<std::unique_ptr<ByteSource>> source = openFileSource(path);
-  if (!source) return tl::make_unexpected(std::move(source.error()));
-  return open(std::move(*source));
+  return guarded<Pack>([&]() -> Result<Pack> {
+    Result<std::unique_ptr<ByteSource>> source = openFileSource(path);
+    if (!source) return tl::make_unexpected(std::move(source.error()));
+    return open(std::move(*source));
+  });
 }
 
 std::span<const std::byte> Page::stream(const PageRecord& record, Stream which) const {
@@ -127,21 +132,25 @@ std::span<const std::uint32_t> Pack::pagesOf(const GridFrame& gridFrame) const {
 }
 
 Result<std::string> Pack::infoJson() const {
-  std::string text;
-  FirstError sink;
-  readTable(*source_, sections_, kSectionInfo, text, sink);
-  if (sink.errors() == 0 && !isUtf8(text)) {
-    sink.report(Rule::infoUtf8, sectionPlace(*findSection(sections_, kSectionInfo)), "It is not.");
-  }
-  if (sink.errors() > 0) return tl::make_unexpected(std::move(sink.issue()));
-  return text;
+  return guarded<std::string>([&]() -> Result<std::string> {
+    std::string text;
+    FirstError sink;
+    readTable(*source_, sections_, kSectionInfo, text, sink);
+    if (sink.errors() == 0 && !isUtf8(text)) {
+      sink.report(Rule::infoUtf8, sectionPlace(*findSection(sections_, kSectionInfo)), "It is not.");
+    }
+    if (sink.errors() > 0) return tl::make_unexpected(std::move(sink.issue()));
+    return text;
+  });
 }
 
 Result<Page> Pack::readPage(std::uint32_t number) const {
-  Page page;
-  FirstError sink;
-  if (!loadPage(*this, number, page, sink)) return tl::make_unexpected(std::move(sink.issue()));
-  return page;
+  return guarded<Page>([&]() -> Result<Page> {
+    Page page;
+    FirstError sink;
+    if (!loadPage(*this, number, page, sink)) return tl::make_unexpected(std::move(sink.issue()));
+    return page;
+  });
 }
 
 }  // namespace billow::format

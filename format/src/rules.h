@@ -19,6 +19,7 @@
 #include "billow/format/layout.h"
 #include "billow/format/pack.h"
 #include "billow/format/source.h"
+#include "billow/format/text.h"
 
 namespace billow::format {
 
@@ -29,6 +30,7 @@ enum class Rule : std::uint16_t {
   tooManyBricks = 3,
   tableLimit = 4,
   frameLimit = 5,
+  memory = 6,
 
   tooShort = 101,
   magic = 102,
@@ -174,7 +176,6 @@ void checkPadding(const ByteSource& source, const FileHeader& header, std::span<
 // Reads the section in pieces.
 void checkSectionBytes(const ByteSource& source, const SectionEntry& section, IssueSink& sink);
 std::string_view sectionName(std::uint32_t type);  // "" when unknown
-bool isUtf8(std::string_view text);
 
 // ---- Tables (table_rules.cpp): the records against one another.
 struct TableView {

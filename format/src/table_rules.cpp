@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 
+#include "billow/format/affine.h"
 #include "rules.h"
 
 namespace billow::format {
@@ -32,7 +33,7 @@ void checkName(const TableView& tables, StringRef ref, const Place& place, std::
   }
   const std::string_view name = textOf(tables, ref);
   if (!isUtf8(name)) return sink.report(Rule::stringRange, place, "It is cut inside of a character.");
-  const bool control = std::any_of(name.begin(), name.end(), [](char c) { return (c >= 0 && c < 0x20) || c == 0x7f; });
+  const bool control = std::any_of(name.begin(), name.end(), isControl);
   if (name.empty() || control) {
     return sink.report(Rule::nameEmpty, place, name.empty() ? "It is empty." : "It has control characters.");
   }
@@ -142,12 +143,6 @@ void checkVolumeFrames(const TableView& tables, std::uint32_t number, IssueSink&
   }
 }
 
-bool invertible(const double (&m)[12]) {
-  const double determinant =
-      m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);
-  return finite(determinant) && determinant != 0;
-}
-
 void checkValues(const GridFrame& frame, const Place& place, IssueSink& sink) {
   const bool values = finite(frame.background) && finite(frame.valueMin) && finite(frame.valueMax) &&
                       frame.valueMin <= frame.background && frame.background <= frame.valueMax;
@@ -170,6 +165,11 @@ void checkBox(const GridFrame& frame, const Place& place, IssueSink& sink) {
     if (frame.origin[axis] % 8 != 0) {
       sink.report(Rule::gridFrameOrigin, place, fmt::format("Axis {} begins at {}.", axis, frame.origin[axis]));
     }
+  }
+  for (int axis = 0; axis < 3 && !empty; ++axis) {
+    const std::int64_t last = std::int64_t{frame.origin[axis]} + frame.activeMax[axis];
+    if (last <= std::numeric_limits<std::int32_t>::max()) continue;
+    sink.report(Rule::gridFrameOrigin, place, fmt::format("Axis {} ends at {}.", axis, last));
   }
   if (empty == (frame.activeVoxels == 0) && (empty || inside)) return;
   sink.report(
@@ -210,9 +210,9 @@ void checkGridFrame(const TableView& tables, std::uint64_t index, std::uint64_t 
     sink.report(Rule::gridFrameFlags, place, fmt::format("Its flags are {:#x}.", frame.flags));
   }
   if (frame.reserved != 0) sink.report(Rule::tableReserved, place, "A reserved field of a grid frame is not.");
-  const bool numbers = std::all_of(std::begin(frame.indexToWorld), std::end(frame.indexToWorld),
-                                   [](double value) { return finite(value); });
-  if (!numbers || !invertible(frame.indexToWorld)) {
+  if (!invertible(frame.indexToWorld)) {
+    const bool numbers = std::all_of(std::begin(frame.indexToWorld), std::end(frame.indexToWorld),
+                                     [](double value) { return finite(value); });
     sink.report(Rule::transform, place, numbers ? "It is singular." : "It is not finite.");
   }
   checkValues(frame, place, sink);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "grid_walk.h"
+#include "guard.h"
 #include "parallel.h"
 #include "rules.h"
 
@@ -96,10 +97,10 @@ class Validation {
         limit_(std::max(options.maxIssues, 1u)),
         collector_(limit_) {}
 
-  std::vector<Issue>& run() {
+  void run() {
     FileHeader header{};
     const bool sound = PackReader::read(std::make_unique<BorrowedSource>(source_), pack_, header, collector_);
-    if (pack_.sections().empty()) return collector_.issues();
+    if (pack_.sections().empty()) return;
     checkPadding(source_, header, pack_.sections(), collector_);
     checkInfo();
     FirstError probe;
@@ -108,8 +109,9 @@ class Validation {
     if (!collector_.stopped()) checkParts();
     // After an error, what is not reached may only be out of reach.
     if (sound && collector_.errors() == 0) usage_->check(pack_, collector_);
-    return collector_.issues();
   }
+
+  const std::vector<Issue>& issues() { return collector_.issues(); }
 
  private:
   using Issues = std::vector<Issue>;
@@ -233,7 +235,12 @@ class Validation {
 
 void validate(const ByteSource& source, const ValidateOptions& options, const std::function<void(const Issue&)>& sink) {
   Validation validation(source, options);
-  for (const Issue& issue : validation.run()) sink(issue);
+  const Result<bool> finished = guarded<bool>([&] {
+    validation.run();
+    return true;
+  });
+  for (const Issue& issue : validation.issues()) sink(issue);
+  if (!finished) sink(finished.error());
 }
 
 }  // namespace billow::format

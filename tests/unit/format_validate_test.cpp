@@ -313,7 +313,12 @@ TEST(Rules, GridFrames) {
   expectIssue(219, [](PackImage& i) {
     i.gridFrames[1].activeMax[1] = 4, i.gridFrames[1].activeMax[0] = 0, i.gridFrames[1].activeMax[2] = 0;
   });
+  expectIssue(217, [](PackImage& i) {  // a determinant of 8e-324, whose reciprocal no binary64 holds
+    for (const int axis : {0, 5, 10}) i.gridFrames[0].indexToWorld[axis] = 2e-108;
+  });
   expectIssue(220, [](PackImage& i) { i.gridFrames[0].origin[2] = -4; });
+  expectIssue(220,
+              [](PackImage& i) { i.gridFrames[0].origin[1] = 0x7ffffff8 - (i.gridFrames[0].activeMax[1] & ~7) + 8; });
   expectIssue(221, [](PackImage& i) { i.gridFrames[1].maskCount = 1; });
   expectIssue(222, [](PackImage& i) { i.gridFrames[3].pageListCount = 0xffffffffu; });
   expectIssue(223, [](PackImage& i) {

@@ -19,6 +19,13 @@ class GridView {
   // frame-limit). Listed page numbers must be those of the pack's own tables.
   static Result<GridView> load(const Pack& pack, const GridFrame& gridFrame);
 
+  // Leaves and tiles point into the view's own pages: moving keeps them valid, a copy's would not be its own.
+  GridView(const GridView&) = delete;
+  GridView& operator=(const GridView&) = delete;
+  GridView(GridView&&) = default;
+  GridView& operator=(GridView&&) = default;
+  ~GridView() = default;
+
   const GridFrame& frame() const { return frame_; }
 
   struct Leaf {
@@ -45,6 +52,8 @@ class GridView {
 
  private:
   friend struct GridLoader;
+  GridView() = default;
+
   GridFrame frame_{};
   std::vector<Page> pages_;
   std::vector<Leaf> leaves_;

@@ -1,4 +1,5 @@
-// Value-or-error. No exception crosses format's or runtime's API.
+// Value-or-error. No exception crosses the API of reading a pack (pack.h, grid_view.h, validate.h) or of the runtime:
+// where memory runs out, that is an error too.
 #ifndef BILLOW_FORMAT_RESULT_H
 #define BILLOW_FORMAT_RESULT_H
 

@@ -20,8 +20,10 @@ struct ValidateOptions {
 };
 
 // Checks every byte of the pack. Issues arrive in the order of the checks (header, contents, tables, sections, pages by
-// number, grid frames by number), the same for any thread count. `sink` is called from this thread.
-// Bounded: memory is the tables and, for each thread, the pages of one grid frame.
+// number, grid frames by number), the same for any thread count. `sink` is called from this thread. Where memory runs
+// out, a last issue says so (memory); what the rest of the pack holds is then not known.
+// Memory is the tables, for each thread the pages of one grid frame, and one bit for each node, mask and brick unit of
+// the pack.
 void validate(const ByteSource& source, const ValidateOptions& options, const std::function<void(const Issue&)>& sink);
 
 }  // namespace billow::format
