@@ -9,6 +9,7 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -28,7 +29,12 @@ class OrderedWork {
   void runAll() {
     std::vector<std::thread> others;
     const std::size_t most = std::min(threads_, count_);
-    for (std::size_t i = 1; i < most; ++i) others.emplace_back([this] { run(); });
+    others.reserve(most);  // nothing may throw between the first thread's start and the joins
+    try {
+      for (std::size_t i = 1; i < most; ++i) others.emplace_back([this] { run(); });
+    } catch (const std::system_error&) {
+      // The system has no more threads to give: those that started do the work.
+    }
     run();
     for (std::thread& thread : others) thread.join();
     if (failure_) std::rethrow_exception(failure_);
