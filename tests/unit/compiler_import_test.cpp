@@ -1,7 +1,9 @@
 // Planning: which files, frames, grids and roles come out of what the user typed; and what damaged files give.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -225,6 +227,32 @@ TEST(PlanGrids, FilterTakesNamesBaseNamesAndComponents) {
   EXPECT_TRUE(has(unknown.error, "density, vel")) << unknown.error;
 }
 
+// Names come from anywhere; a pack's are UTF-8 without control characters.
+TEST(PlanGrids, NamesThatAPackCannotHoldAreMended) {
+  const TempFolder folder;
+  writeGrids(folder / "smoke\xff\x01_7.vdb", {"den\nsity", "h\xc3\xa9t", "t\xc3"});
+  const Planned planned = plan({folder.path().string()});
+  EXPECT_EQ(namesOf(planned), (Names{"den_sity", "h\xc3\xa9t", "t_"})) << planned.error;
+  EXPECT_EQ(planned.volumes.at(0).name, "smoke__");
+  EXPECT_EQ(planned.volumes.at(0).grids[0].source, "den\nsity");
+  EXPECT_EQ(planned.warnings.size(), 3u);
+  ImportOptions options;
+  options.grids = {"den_sity"};
+  EXPECT_EQ(namesOf(plan({folder.path().string()}, options)), Names{"den_sity"});
+}
+
+TEST(PlanFrames, RatesThatAPackCannotHoldAreRefused) {
+  const TempFolder folder;
+  writeGrids(folder / "a.vdb", {"density"});
+  ImportOptions options;
+  for (const double rate : {0.0, 1e-50, 0.0009, 1.1e6, std::nan("")}) {
+    options.framesPerSecond = rate;
+    EXPECT_EQ(plan({folder / "a.vdb"}, options).fault, 1) << rate;
+  }
+  options.framesPerSecond = 0.001;
+  EXPECT_EQ(plan({folder / "a.vdb"}, options).fault, 0);
+}
+
 TEST(PlanGrids, OneNameMustNotBeScalarAndVector) {
   const TempFolder folder;
   writeGrids(folder / "a_1.vdb", {"v"});
@@ -359,6 +387,12 @@ TEST_F(Manifest, ErrorsNamePlaceValueAndExpectation) {
        {"/volumes/0/look/albedo/1", "2"}},
       {R"({"volumes":[{"name":"a","inputs":["in/cloud.vdb"],"look":{"anisotropy":1}}]})",
        {"/volumes/0/look/anisotropy"}},
+      {R"({"volumes":[{"name":"a","inputs":["in/cloud.vdb"],"look":{"anisotropy":0.99999999999}}]})",
+       {"/volumes/0/look/anisotropy"}},
+      {R"({"volumes":[{"name":"a","inputs":["in/cloud.vdb"],"fps":1e999}]})", {"1e999"}},
+      {R"({"volumes":[{"name":"a\n","inputs":["in/cloud.vdb"]}]})", {"/volumes/0/name", "control"}},
+      {R"({"volumes":[{"name":"a","inputs":["in/cloud.vdb"],"grids":[{"name":"\u007f","source":"density"}]}]})",
+       {"/volumes/0/grids/0/name", "control"}},
       {R"({"volumes":[{"name":"a","inputs":["in/cloud.vdb"]},{"name":"a","inputs":["in/cloud.vdb"]}]})",
        {"/volumes/1/name", "no other volume"}},
   };
@@ -368,6 +402,23 @@ TEST_F(Manifest, ErrorsNamePlaceValueAndExpectation) {
     EXPECT_TRUE(has(planned.error, "m.json")) << planned.error;
     for (const std::string& text : manifest.says)
       EXPECT_TRUE(has(planned.error, text)) << text << "\n" << planned.error;
+  }
+}
+
+TEST_F(Manifest, TakesTheLargestFactor) {
+  const Planned planned =
+      planText(R"({"volumes":[{"name":"a","inputs":["in/cloud.vdb"],"look":{"emissionScale":1e30}}]})");
+  EXPECT_EQ(planned.volumes.at(0).look.emissionScale, 1e30f) << planned.error;
+}
+
+TEST_F(Manifest, WhatIsNoFileIsAFileError) {
+  std::filesystem::create_directory(folder_ / "folder.json");
+  ASSERT_EQ(::mkfifo((folder_ / "pipe.json").c_str(), 0600), 0);
+  ASSERT_EQ(::mkfifo((folder_ / "pipe.vdb").c_str(), 0600), 0);
+  for (const char* name : {"folder.json", "pipe.json", "pipe.vdb"}) {
+    const Planned planned = plan({folder_ / name});
+    EXPECT_EQ(planned.fault, 2) << name;
+    EXPECT_TRUE(has(planned.error, name)) << planned.error;
   }
 }
 

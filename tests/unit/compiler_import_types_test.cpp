@@ -5,8 +5,10 @@
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include <cmath>
+#include <fstream>
 #include <limits>
 
+#include "import/vdb_write.h"
 #include "stages.h"
 #include "unit/run_command.h"
 
@@ -199,6 +201,48 @@ TEST(ImportTransform, AnyAffineOneIsTaken) {
   }
 }
 
+// OpenVDB makes no such grid, but reads it: 2^-20 a voxel, where the file that it wrote had 2^-10.
+TEST(ImportTransform, TinyVoxelsAreTaken) {
+  openvdb::initialize();
+  auto grid = makeGrid<openvdb::FloatGrid>("density");
+  grid->tree().setValueOn(kAt, 1);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(std::exp2(-10)));
+  const TempFolder folder;
+  openvdb::io::File file(folder / "a.vdb");
+  file.write({grid});
+  file.close();
+  std::string bytes = tests::readFile(folder / "a.vdb");
+  const auto three = [](double value) {
+    std::string text;
+    for (int i = 0; i < 3; ++i) text.append(reinterpret_cast<const char*>(&value), sizeof(value));
+    return text;
+  };
+  const std::size_t at = bytes.find(three(std::exp2(-10)));
+  ASSERT_NE(at, std::string::npos);
+  bytes.replace(at, 24, three(std::exp2(-20)));
+  std::ofstream(folder / "a.vdb", std::ios::binary) << bytes;
+  const Warn ignore = [](const std::string&) {};
+  const Plan plan = planInputs({folder / "a.vdb"}, {}, ignore);
+  const ImportedFrame frame = importFrame(plan.volumes[0], plan.volumes[0].frames[0], {}, ignore);
+  EXPECT_EQ(frame.grids[0].indexToWorld[0], std::exp2(-20));
+}
+
+// One line, exit code 2 and no file, rather than a fault of our own.
+TEST(WriteVdb, RefusesVoxelsThatOpenVdbDoes) {
+  const TempFolder folder;
+  ImportedGrid grid;
+  grid.indexToWorld = {1e-6, 0, 0, 0, 0, 1e-6, 0, 0, 0, 0, 1e-6, 0};
+  const std::vector<VdbOutput> outputs{{"density", true, {&grid}}};
+  try {
+    writeVdb(folder / "a.vdb", outputs);
+    FAIL() << "written";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.fault(), Fault::file);
+    EXPECT_NE(std::string(error.what()).find("too small for OpenVDB"), std::string::npos) << error.what();
+  }
+  EXPECT_EQ(folder.fileCount(), 0u);
+}
+
 TEST(ImportTransform, FrustumIsRefused) {
   auto grid = makeGrid<openvdb::FloatGrid>("density");
   grid->tree().setValueOn(Coord(1, 1, 1), 1);
@@ -249,6 +293,20 @@ TEST(ImportValues, DenormalsBecomeZeroWithAWarning) {
   const Imported imported = importGrids({oneValue<openvdb::FloatGrid>("density", 1e-40f)});
   EXPECT_EQ(activeAt(imported.grid("density"), kAt), 0);
   EXPECT_EQ(imported.warnings.size(), 1u);
+}
+
+TEST(ImportValues, RoundingThatShowsIsToldWithItsVoxel) {
+  auto grid = makeGrid<openvdb::Int32Grid>("id", 1 << 30);
+  grid->tree().setValueOn(kAt, (1 << 30) + 128);
+  grid->tree().setValueOn(Coord(3, 4, 5), (1 << 30) + 33);
+  const Imported imported = importGrids({grid});
+  ASSERT_EQ(imported.warnings.size(), 1u);
+  EXPECT_NE(imported.warnings[0].find("1 values are rounded to single precision, by 33 at most, at index (3, 4, 5)"),
+            std::string::npos)
+      << imported.warnings[0];
+  auto fine = makeGrid<openvdb::DoubleGrid>("density");
+  fine->tree().setValueOn(kAt, 0.1);
+  EXPECT_TRUE(importGrids({fine}).warnings.empty());
 }
 
 TEST(ImportLevelSets, AreRefusedOrConverted) {

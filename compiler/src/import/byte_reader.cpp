@@ -1,13 +1,10 @@
 #include "import/byte_reader.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include "stages.h"
 
@@ -17,28 +14,17 @@ namespace {
 constexpr std::size_t kWindowBytes = 128u << 10;
 constexpr std::uint32_t kLongestString = 64u << 10;
 
-[[noreturn]] void failToRead(const std::string& path, int error) {
-  throw Error(Fault::file, fmt::format("{}: cannot be read: {}", path, std::strerror(error)));
+[[noreturn]] void failToRead(const std::string& path, const std::string& detail) {
+  throw Error(Fault::file, fmt::format("{}: cannot be read: {}", path, detail));
 }
 
 }  // namespace
 
 ByteReader::ByteReader(const std::string& path) : path_(path) {
-  descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor_ < 0) failToRead(path, errno);
-  struct stat status {};
-  const bool known = ::fstat(descriptor_, &status) == 0;
-  const int error = known ? EINVAL : errno;
-  if (!known || !S_ISREG(status.st_mode)) {
-    ::close(descriptor_);
-    if (known) throw Error(Fault::file, fmt::format("{}: cannot be read: not a regular file", path));
-    failToRead(path, error);
-  }
-  size_ = limit_ = static_cast<std::uint64_t>(status.st_size);
-}
-
-ByteReader::~ByteReader() {
-  ::close(descriptor_);
+  auto source = format::openFileSource(path);
+  if (!source) failToRead(path, source.error().detail);
+  source_ = std::move(*source);
+  size_ = limit_ = source_->size();
 }
 
 void ByteReader::fail(const std::string& detail) const {
@@ -81,16 +67,13 @@ void ByteReader::read(void* into, std::size_t bytes, const char* what) {
 }
 
 void ByteReader::fill() {
-  window_.resize(kWindowBytes);
+  window_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(kWindowBytes, size_ - position_)));
   windowStart_ = position_;
   windowSize_ = 0;
-  ssize_t got = 0;
-  do {
-    got = ::pread(descriptor_, window_.data(), window_.size(), static_cast<off_t>(position_));
-  } while (got < 0 && errno == EINTR);
-  if (got < 0) failToRead(path_, errno);
-  if (got == 0) throw Error(Fault::file, fmt::format("{}: cannot be read: the file has shrunk while open", path_));
-  windowSize_ = static_cast<std::size_t>(got);
+  if (!source_->read(position_, window_)) {
+    failToRead(path_, fmt::format("{} bytes at {} (has the file shrunk while open?)", window_.size(), position_));
+  }
+  windowSize_ = window_.size();
 }
 
 std::string ByteReader::string(const char* what) {

@@ -4,9 +4,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <type_traits>
 #include <vector>
+
+#include "billow/format/source.h"
 
 namespace billow::compiler {
 
@@ -15,9 +18,6 @@ class ByteReader {
  public:
   // Throws Error(Fault::file) when the file cannot be opened or is no regular file.
   explicit ByteReader(const std::string& path);
-  ByteReader(const ByteReader&) = delete;
-  ByteReader& operator=(const ByteReader&) = delete;
-  ~ByteReader();
 
   const std::string& path() const { return path_; }
   std::uint64_t size() const { return size_; }
@@ -48,7 +48,7 @@ class ByteReader {
   void fill();
 
   std::string path_;
-  int descriptor_ = -1;
+  std::unique_ptr<format::ByteSource> source_;
   std::uint64_t size_ = 0;
   std::uint64_t limit_ = 0;
   std::uint64_t position_ = 0;

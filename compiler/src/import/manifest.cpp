@@ -2,17 +2,15 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <sstream>
 
+#include "billow/format/source.h"
+#include "billow/format/text.h"
 #include "import/roles.h"
 #include "import/volume_request.h"
 
@@ -67,13 +65,25 @@ class Node {
     return value_.get<std::string>();
   }
 
-  // A number in [low, high], or strictly between them where `open`.
+  // A text that can name something in a pack; JSON has seen to it that it is UTF-8.
+  std::string name(const std::string& what) const {
+    const std::string text = string(what.c_str());
+    if (std::any_of(text.begin(), text.end(), format::isControl)) fail(what + " without control characters");
+    return text;
+  }
+
+  // A number in [low, high], or strictly between them where `open`; in single precision too, which may round it.
   float number(double low, double high, bool open, const char* what) const {
     if (!value_.is_number()) fail(what);
+    const auto check = [&](auto number, auto least, auto most) {
+      const bool inside = open ? number > least && number < most : number >= least && number <= most;
+      if (!inside) fail(what);
+    };
     const double number = value_.get<double>();
-    const bool inside = open ? number > low && number < high : number >= low && number <= high;
-    if (!inside) fail(what);
-    return static_cast<float>(number);
+    check(number, low, high);
+    const auto rounded = static_cast<float>(number);
+    check(rounded, static_cast<float>(low), static_cast<float>(high));
+    return rounded;
   }
 
  private:
@@ -158,7 +168,7 @@ GridRequest readGrid(const Node& node) {
   node.requireObject({"name", "source", "role"});
   GridRequest grid;
   grid.place = node.place();
-  grid.name = node.at("name").string("a grid's name");
+  grid.name = node.at("name").name("a grid's name");
   grid.source = node.has("source") ? node.at("source").string("a grid's name in the files") : grid.name;
   if (!node.has("role")) return grid;
   const std::string expected = "one of " + roleWords();
@@ -183,7 +193,7 @@ VolumeRequest readVolume(const Node& node, const std::filesystem::path& folder, 
   node.requireObject({"name", "inputs", "grids", "fps", "frames", "missing", "look"});
   VolumeRequest volume;
   volume.options = options;
-  volume.name = node.at("name").string("a volume's name");
+  volume.name = node.at("name").name("a volume's name");
   for (const Node& input : node.at("inputs").items("a list of files, directories or patterns")) {
     volume.inputs.push_back((folder / input.string("a file, a directory or a pattern")).string());
   }
@@ -198,16 +208,10 @@ VolumeRequest readVolume(const Node& node, const std::filesystem::path& folder, 
   return volume;
 }
 
-std::string readText(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
-  std::ostringstream text;
-  if (stream) text << stream.rdbuf();
-  if (!stream) throw Error(Fault::file, fmt::format("{}: cannot be read: {}", path, std::strerror(errno)));
-  return text.str();
-}
-
 json parse(const std::string& path) {
-  const std::string text = readText(path);
+  const auto read = format::readTextFile(path);
+  if (!read) throw Error(Fault::file, fmt::format("{}: cannot be read: {}", path, read.error().detail));
+  const std::string& text = *read;
   try {
     return json::parse(text, nullptr, /*allow_exceptions=*/true, /*ignore_comments=*/true);
   } catch (const json::parse_error& error) {
@@ -215,6 +219,8 @@ json parse(const std::string& path) {
     const auto end = begin + static_cast<std::ptrdiff_t>(std::min(error.byte, text.size()));
     throw Error(Fault::input,
                 fmt::format("{}: not JSON at line {}: {}", path, 1 + std::count(begin, end, '\n'), error.what()));
+  } catch (const json::exception& error) {  // a number that no double holds
+    throw Error(Fault::input, fmt::format("{}: not usable JSON: {}", path, error.what()));
   }
 }
 

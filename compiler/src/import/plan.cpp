@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 
+#include "billow/format/text.h"
 #include "import/inputs.h"
 #include "import/roles.h"
 #include "import/vdb_file.h"
@@ -16,6 +17,28 @@
 
 namespace billow::compiler {
 namespace {
+
+// A name from outside as a pack may hold it: '_' for every byte that is not UTF-8 or is a control character.
+std::string cleanName(const std::string& name) {
+  std::string clean;
+  for (std::size_t at = 0; at < name.size();) {
+    std::size_t length = 1;
+    while (length < 4 && !format::isUtf8(name.substr(at, length))) ++length;
+    const std::string character = name.substr(at, length);
+    const bool sound = format::isUtf8(character) && !format::isControl(character[0]);
+    clean += sound ? character : "_";
+    at += sound ? length : 1;
+  }
+  return clean;
+}
+
+// As cleanName(), with a warning that names `what` where anything is replaced.
+std::string packName(const std::string& name, const std::string& what, const Warn& warn) {
+  std::string clean = cleanName(name);
+  if (clean != name)
+    warn(fmt::format("{} has a name with bytes that a pack cannot hold; it becomes '{}'", what, clean));
+  return clean;
+}
 
 // The grids of all frames of a volume, by name in the files.
 class GridUnion {
@@ -54,7 +77,8 @@ class GridUnion {
                         });
     if (!listed || !requests.empty() || options_.grids.empty()) return listed;
     return std::any_of(options_.grids.begin(), options_.grids.end(), [&](const std::string& asked) {
-      return asked == name || asked.substr(0, asked.find_last_of('.')) == name;
+      const std::string clean = cleanName(name);
+      return asked == clean || asked.substr(0, asked.find_last_of('.')) == clean;
     });
   }
 
@@ -119,8 +143,9 @@ struct GridList {
 };
 
 std::string namesOf(const GridUnion& found) {
-  std::set<std::string> names = found.others();
-  for (const auto& [name, entry] : found.grids()) names.insert(name);
+  std::set<std::string> names;
+  for (const std::string& name : found.others()) names.insert(cleanName(name));
+  for (const auto& [name, entry] : found.grids()) names.insert(cleanName(name));
   return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
 }
 
@@ -156,10 +181,12 @@ void checkNames(const std::vector<PlannedGrid>& grids, const std::string& volume
   throw Error(Fault::input, text);
 }
 
-GridList requestedGrids(const VolumeRequest& request, const GridUnion& found) {
+GridList requestedGrids(const VolumeRequest& request, const GridUnion& found, const Warn& warn) {
   GridList list;
   if (request.grids.empty()) {
-    for (const auto& [name, entry] : found.grids()) list.add({name, name, std::nullopt, ""}, entry);
+    for (const auto& [name, entry] : found.grids()) {
+      list.add({packName(name, entry.file + ": a grid", warn), name, std::nullopt, ""}, entry);
+    }
     return list;
   }
   for (const GridRequest& grid : request.grids) {
@@ -201,12 +228,13 @@ Planned planVolume(const VolumeRequest& request, const Warn& warn) {
   const NumberedFiles files = findFiles(request.inputs);
   Planned planned;
   PlannedVolume& volume = planned.volume;
-  volume.name = request.name.empty() ? volumeName(files.begin()->second.front()) : request.name;
+  const std::string& first = files.begin()->second.front();
+  volume.name = request.name.empty() ? packName(volumeName(first), first + ": the volume", warn) : request.name;
   volume.look = request.look;
   volume.framesPerSecond = request.options.framesPerSecond.value_or(24);
-  if (!(volume.framesPerSecond > 0 && volume.framesPerSecond <= 1e6)) {
+  if (!(volume.framesPerSecond >= 0.001 && volume.framesPerSecond <= 1e6)) {
     throw Error(Fault::commandLine,
-                fmt::format("{} frames per second; expected more than 0, at most 1000000", volume.framesPerSecond));
+                fmt::format("{} frames per second; expected 0.001 to 1000000", volume.framesPerSecond));
   }
   volume.frames = selectFrames(files, request.options);
   GridUnion found(request.options, warn);
@@ -215,7 +243,7 @@ Planned planVolume(const VolumeRequest& request, const Warn& warn) {
   }
   if (found.grids().empty() && found.others().empty()) failEmpty(volume, found);
   planned.offered = namesOf(found);
-  GridList list = requestedGrids(request, found);
+  GridList list = requestedGrids(request, found, warn);
   keepSelected(list, request.options.grids);
   list.sortByName();
   assignRoles(list.grids, list.fixed);

@@ -23,7 +23,22 @@ struct Notes {
   float min = 0, max = 0;
   std::uint32_t nonFinite = 0, tooLarge = 0, denormal = 0;
   std::uint32_t firstNonFinite = 0, firstTooLarge = 0;  // voxel indices
+  std::uint64_t rounded = 0;                            // values that single precision does not hold exactly
+  double rounding = 0;                                  // the largest difference that makes
+  std::uint32_t mostRounded = 0;                        // and its voxel index
 };
+
+template <class T>
+void noteRounding(T value, float result, std::uint32_t index, Notes& notes) {
+  if constexpr (std::is_same_v<T, double> || (std::is_integral_v<T> && sizeof(T) >= 4)) {
+    using Wide = std::conditional_t<sizeof(T) == 8 && std::is_integral_v<T>, long double, double>;
+    const auto difference = static_cast<double>(std::fabs(static_cast<Wide>(value) - static_cast<Wide>(result)));
+    if (difference > 0) ++notes.rounded;
+    if (difference <= notes.rounding) return;
+    notes.rounding = difference;
+    notes.mostRounded = index;
+  }
+}
 
 // Converts one value; `index` is where it stands, for the notes.
 template <class T>
@@ -43,6 +58,7 @@ float convert(T value, std::uint32_t index, Notes& notes) {
     ++notes.denormal;
     return 0;
   }
+  noteRounding(value, result, index, notes);
   return result;
 }
 
@@ -88,6 +104,8 @@ class TreeSource {
       failNonFinite("the background is not finite");
     }
     total.nonFinite = 0;
+    total.rounding = 0;  // it is about voxels
+    total.rounded = 0;
     if (total.tooLarge != 0) return warnTooLarge("the background", componentOf(background_, component));
     out.leaves.resize(leaves_.size());
     std::vector<Notes> notes(leaves_.size());
@@ -180,6 +198,8 @@ class TreeSource {
     into.nonFinite += from.nonFinite;
     into.tooLarge += from.tooLarge;
     into.denormal += from.denormal;
+    into.rounded += from.rounded;
+    into.rounding = std::max(into.rounding, from.rounding);
   }
 
   bool report(std::uint32_t component, const std::vector<Notes>& leafNotes, const std::vector<Notes>& tileNotes,
@@ -199,7 +219,24 @@ class TreeSource {
                       "set to 0",
                       what_, total.denormal));
     }
+    // A millionth of the range: well below what any encoding keeps.
+    const double range = static_cast<double>(total.max) - static_cast<double>(total.min);
+    if (range > 0 && total.rounding > range * 0x1p-20) {
+      context_.warn(fmt::format("{}: {} values are rounded to single precision, by {} at most, at index {}", what_,
+                                total.rounded, total.rounding,
+                                where(mostRounded(leafNotes, tileNotes, total.rounding))));
+    }
     return true;
+  }
+
+  std::array<std::int32_t, 3> mostRounded(const std::vector<Notes>& leafNotes, const std::vector<Notes>& tileNotes,
+                                          double rounding) const {
+    for (std::size_t i = 0; i < leafNotes.size(); ++i) {
+      if (leafNotes[i].rounding == rounding) return voxelAt(toArray(leaves_[i]->origin()), leafNotes[i].mostRounded);
+    }
+    std::size_t i = 0;
+    while (tileNotes[i].rounding != rounding) ++i;
+    return tiles_[i].origin;
   }
 
   struct Found {
@@ -264,20 +301,22 @@ void levelSetToFog(GridT& grid, const std::string& what, const ReadContext& cont
   }
 }
 
-// 3x4 row-major; OpenVDB multiplies row vectors, so its matrix is the transpose.
+// 3x4 row-major. Asked of the map itself: OpenVDB's general matrix refuses voxels of less than 3e-15 cubic units.
 std::array<double, 12> matrixOf(const openvdb::math::Transform& transform, const std::string& what) {
   if (!transform.isLinear()) throw Error(Fault::input, what + ": its transform is not affine");
-  const openvdb::Mat4d m = transform.baseMap()->getAffineMap()->getMat4();
+  const openvdb::math::MapBase& map = *transform.baseMap();
+  const openvdb::Vec3d columns[4] = {map.applyJacobian({1, 0, 0}), map.applyJacobian({0, 1, 0}),
+                                     map.applyJacobian({0, 0, 1}), map.applyMap({0, 0, 0})};
   std::array<double, 12> result{};
   bool sound = true;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column) {
-      const double value = m(column, row);
+      const double value = columns[column][row] + 0.0;  // no negative zero
       sound = sound && std::isfinite(value);
       result[static_cast<std::size_t>(row) * 4 + static_cast<std::size_t>(column)] = value;
     }
   }
-  const double volume = openvdb::Mat3d(m.getMat3()).det();
+  const double volume = columns[0].dot(columns[1].cross(columns[2]));
   if (!sound || volume == 0 || !std::isfinite(volume)) {
     throw Error(Fault::input, what + ": its transform is singular or not finite");
   }
@@ -358,6 +397,10 @@ void guarded(const std::string& path, const Read& read) {
     throw;
   } catch (const std::bad_alloc&) {
     throw;
+  } catch (const openvdb::ArithmeticError& error) {
+    throw Error(Fault::input, fmt::format("{}: OpenVDB cannot read it: {}; a transform is singular, or its voxels are "
+                                          "too small for OpenVDB (less than 3e-15 cubic units)",
+                                          path, error.what()));
   } catch (const std::exception& error) {
     throw Error(Fault::input, fmt::format("{}: damaged: OpenVDB cannot read it: {}", path, error.what()));
   }

@@ -92,15 +92,21 @@ void checkWritten(const std::string& path) {
 
 void writeVdb(const std::string& path, std::span<const VdbOutput> grids) {
   openvdb::initialize();
-  openvdb::GridPtrVec made;
-  for (const VdbOutput& output : grids) made.push_back(makeGrid(output));
   format::TempFile target(path);
   try {
+    openvdb::GridPtrVec made;
+    for (const VdbOutput& output : grids) made.push_back(makeGrid(output));
     openvdb::io::File file(target.temporaryPath());
     file.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
     file.write(made);
     file.close();
     checkWritten(target.temporaryPath());
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const openvdb::ArithmeticError& error) {
+    throw Error(Fault::file, fmt::format("{}: cannot be written: {}; voxels of less than 3e-15 cubic units are too "
+                                         "small for OpenVDB",
+                                         path, error.what()));
   } catch (const std::exception& error) {
     throw Error(Fault::file, fmt::format("{}: cannot be written: {}", path, error.what()));
   }
