@@ -7,6 +7,7 @@
 #include "command.h"
 #include "grid_error.h"
 #include "import_options.h"
+#include "pack_lookup.h"
 #include "reconstruct.h"
 
 namespace billow::command {
@@ -153,7 +154,7 @@ int runCompare(const Arguments& arguments) {
     json["sound"] = allSound;
     json["grids"] = nlohmann::ordered_json::array();
     for (const Row& row : rows) json["grids"].push_back(toJson(row));
-    fmt::print("{}\n", json.dump(2));
+    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   } else {
     printTable(rows);
   }

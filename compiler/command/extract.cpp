@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <memory>
@@ -7,6 +6,7 @@
 #include "command.h"
 #include "import/vdb_write.h"
 #include "import_options.h"
+#include "pack_lookup.h"
 #include "reconstruct.h"
 
 namespace billow::command {
@@ -36,9 +36,8 @@ void checkAsked(const format::Pack& pack, const format::VolumeRecord& volume, co
   const auto grids = pack.gridsOf(volume);
   for (const std::string& name : asked) {
     if (std::any_of(grids.begin(), grids.end(), [&](const auto& grid) { return matches(pack, grid, name); })) continue;
-    std::vector<std::string_view> names;
-    for (const format::GridRecord& grid : grids) names.push_back(pack.string(grid.name));
-    throw Error(Fault::commandLine, fmt::format("--grid {}: no such grid; there is: {}", name, fmt::join(names, ", ")));
+    throw Error(Fault::commandLine,
+                fmt::format("--grid {}: no such grid; there is: {}", name, gridNames(pack, volume)));
   }
 }
 
@@ -67,7 +66,12 @@ std::vector<compiler::VdbOutput> regroup(const std::vector<Extracted>& grids) {
 int runExtract(const Arguments& arguments) {
   const auto pack = format::Pack::openFile(arguments.pack);
   if (!pack) return reportIssue(arguments.pack, pack.error());
-  const format::VolumeRecord& volume = findVolume(*pack, arguments.volume);
+  if (sameFile(arguments.pack, arguments.output)) {
+    throw Error(Fault::commandLine, fmt::format("-o {}: that is the pack itself", arguments.output));
+  }
+  const auto index = findVolume(*pack, arguments.volume);
+  if (!index) throw Error(Fault::commandLine, index.error());
+  const format::VolumeRecord& volume = pack->volumes()[*index];
   const std::ptrdiff_t frame = findFrame(*pack, volume, arguments.frame);
   if (frame < 0) {
     const auto frames = pack->framesOf(volume);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <unordered_map>
 
 namespace billow::command {
@@ -81,10 +82,16 @@ class Lookup {
   template <class Visit>
   static void forEachCell(const Tile& tile, std::int32_t step, const Visit& visit) {
     const Origin first = roundDown(tile.origin, step);
-    const auto dim = static_cast<std::int32_t>(tile.dim);
-    for (std::int32_t x = first[0]; x < tile.origin[0] + dim; x += step) {
-      for (std::int32_t y = first[1]; y < tile.origin[1] + dim; y += step) {
-        for (std::int32_t z = first[2]; z < tile.origin[2] + dim; z += step) visit({x, y, z});
+    Origin last{};  // inclusive, so that no cell begins beyond what 32 bits hold
+    for (std::size_t a = 0; a < 3; ++a) {
+      const std::int64_t end = std::int64_t{tile.origin[a]} + tile.dim - 1;
+      last[a] = static_cast<std::int32_t>(std::min<std::int64_t>(end, std::numeric_limits<std::int32_t>::max()));
+    }
+    for (std::int64_t x = first[0]; x <= last[0]; x += step) {
+      for (std::int64_t y = first[1]; y <= last[1]; y += step) {
+        for (std::int64_t z = first[2]; z <= last[2]; z += step) {
+          visit({static_cast<std::int32_t>(x), static_cast<std::int32_t>(y), static_cast<std::int32_t>(z)});
+        }
       }
     }
   }

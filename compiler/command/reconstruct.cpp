@@ -1,8 +1,5 @@
 #include "reconstruct.h"
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include "billow/format/brick.h"
 
 namespace billow::command {
@@ -47,36 +44,6 @@ compiler::ImportedGrid reconstruct(const format::GridView& view) {
     grid.tiles.push_back({toSource(tile.origin, frame), tile.dim, tile.value});
   }
   return grid;
-}
-
-const format::VolumeRecord& findVolume(const format::Pack& pack, const std::string& name) {
-  if (name.empty() && pack.volumes().size() == 1) return pack.volumes().front();
-  std::vector<std::string_view> names;
-  for (const format::VolumeRecord& volume : pack.volumes()) {
-    if (pack.string(volume.name) == name) return volume;
-    names.push_back(pack.string(volume.name));
-  }
-  throw compiler::Error(
-      compiler::Fault::commandLine,
-      name.empty()
-          ? fmt::format("the pack has {} volumes; choose one with --volume: {}", names.size(), fmt::join(names, ", "))
-          : fmt::format("--volume {}: no such volume; there is: {}", name, fmt::join(names, ", ")));
-}
-
-std::ptrdiff_t findFrame(const format::Pack& pack, const format::VolumeRecord& volume, std::int32_t number) {
-  const auto frames = pack.framesOf(volume);
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    if (frames[i].number == number) return static_cast<std::ptrdiff_t>(i);
-  }
-  return -1;
-}
-
-std::ptrdiff_t findGrid(const format::Pack& pack, const format::VolumeRecord& volume, const std::string& name) {
-  const auto grids = pack.gridsOf(volume);
-  for (std::size_t i = 0; i < grids.size(); ++i) {
-    if (pack.string(grids[i].name) == name) return static_cast<std::ptrdiff_t>(i);
-  }
-  return -1;
 }
 
 }  // namespace billow::command

@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -11,6 +12,7 @@
 #include "billow/headless/headless.h"
 #include "billow/runtime/look.h"
 #include "command.h"
+#include "pack_lookup.h"
 #include "render_image.h"
 #include "render_request.h"
 #include "render_setup.h"
@@ -57,18 +59,19 @@ Checked<void> applyTexts(const Arguments& arguments, RenderRequest& request) {
   if (arguments.background) {
     if (auto done = parseBackground(*arguments.background, request); !done) return done;
   }
-  const auto triple = [](const std::optional<std::string>& text, const char* option,
+  const auto triple = [](const std::optional<std::string>& text, const char* option, const Bounds& bounds,
                          std::optional<Triple>& field) -> Checked<void> {
     if (!text) return {};
-    const auto value = parseTriple(*text, option);
+    const auto value = parseTriple(*text, option, bounds);
     if (!value) return tl::unexpected(value.error());
     field = *value;
     return {};
   };
-  if (auto done = triple(arguments.sunDirection, "--sun", request.sunDirection); !done) return done;
-  if (auto done = triple(arguments.sunColor, "--sun-color", request.sunColor); !done) return done;
-  if (auto done = triple(arguments.albedo, "--albedo", request.look.albedo); !done) return done;
-  if (auto done = triple(arguments.ambient, "--ambient", request.look.ambient); !done) return done;
+  if (auto done = triple(arguments.sunDirection, "--sun", {-kLargest, kLargest}, request.sunDirection); !done)
+    return done;
+  if (auto done = triple(arguments.sunColor, "--sun-color", {0, kLargest}, request.sunColor); !done) return done;
+  if (auto done = triple(arguments.albedo, "--albedo", {0, 1}, request.look.albedo); !done) return done;
+  if (auto done = triple(arguments.ambient, "--ambient", {0, kLargest}, request.look.ambient); !done) return done;
   if (request.sunDirection == Triple{0, 0, 0}) return refuse(kCommandLine, "--sun is 0,0,0; expected a direction");
   return {};
 }
@@ -129,28 +132,12 @@ Checked<RenderRequest> makeRequest(const Arguments& arguments) {
   return request;
 }
 
-Checked<std::uint32_t> findVolume(const format::Pack& pack, const RenderRequest& request) {
-  if (pack.volumes().empty()) return refuse(kInvalid, request.pack + ": the pack has no volume");
-  if (!request.volume) return 0;
-  std::string known;
-  for (std::uint32_t i = 0; i < pack.volumes().size(); ++i) {
-    const std::string_view name = pack.string(pack.volumes()[i].name);
-    if (name == *request.volume) return i;
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", name);
-  }
-  return refuse(kCommandLine, fmt::format("{} has no volume \"{}\"; it has {}", request.pack, *request.volume, known));
-}
-
-Checked<std::uint32_t> findGrid(const format::Pack& pack, const format::VolumeRecord& volume, const std::string& name) {
+Checked<std::uint32_t> chosenGrid(const format::Pack& pack, const format::VolumeRecord& volume,
+                                  const std::string& name) {
   if (name == "none") return format::kNone;
-  std::string known;
-  const auto grids = pack.gridsOf(volume);
-  for (std::uint32_t i = 0; i < grids.size(); ++i) {
-    const std::string_view gridName = pack.string(grids[i].name);
-    if (gridName == name) return i;
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", gridName);
-  }
-  return refuse(kCommandLine, fmt::format("the volume has no grid \"{}\"; it has {}", name, known));
+  const std::ptrdiff_t grid = findGrid(pack, volume, name);
+  if (grid >= 0) return static_cast<std::uint32_t>(grid);
+  return refuse(kCommandLine, fmt::format("the volume has no grid \"{}\"; it has {}", name, gridNames(pack, volume)));
 }
 
 Checked<runtime::GridChoice> findGrids(const format::Pack& pack, const format::VolumeRecord& volume,
@@ -158,7 +145,7 @@ Checked<runtime::GridChoice> findGrids(const format::Pack& pack, const format::V
   runtime::GridChoice choice = runtime::chooseGrids(pack, volume);
   const auto pick = [&](const std::optional<std::string>& name, std::uint32_t& field) -> Checked<void> {
     if (!name) return {};
-    const auto grid = findGrid(pack, volume, *name);
+    const auto grid = chosenGrid(pack, volume, *name);
     if (!grid) return tl::unexpected(grid.error());
     field = *grid;
     return {};
@@ -188,6 +175,17 @@ std::string outputName(const RenderRequest& request, std::int32_t number) {
   const std::filesystem::path path(request.output);
   const std::string name = fmt::format("{}_{:04}{}", path.stem().string(), number, path.extension().string());
   return (path.parent_path() / name).string();
+}
+
+// No picture may take the place of what it is drawn from.
+Checked<void> checkOutputs(const RenderRequest& request, const std::string& input, const format::Pack& pack,
+                           const format::VolumeRecord& volume, const std::vector<std::uint32_t>& frames) {
+  for (const std::uint32_t frame : frames) {
+    const std::string name = outputName(request, pack.framesOf(volume)[frame].number);
+    if (!sameFile(name, request.pack) && !sameFile(name, input)) continue;
+    return refuse(kCommandLine, fmt::format("-o {}: that is the input itself", name));
+  }
+  return {};
 }
 
 struct Job {
@@ -239,11 +237,13 @@ int runRender(const Arguments& arguments) {
   if (!request) return complain(request.error());
   auto pack = format::Pack::openFile(request->pack);
   if (!pack) return reportIssue(request->pack, pack.error());
-  const auto volume = findVolume(*pack, *request);
-  if (!volume) return complain(volume.error());
+  const auto volume = findVolume(*pack, request->volume.value_or(""));
+  if (!volume) return complain({kCommandLine, fmt::format("{}: {}", request->pack, volume.error())});
   const format::VolumeRecord& record = pack->volumes()[*volume];
   const auto frames = findFrames(*pack, record, *request);
   if (!frames) return complain(frames.error());
+  const auto outputs = checkOutputs(*request, arguments.input, *pack, record, *frames);
+  if (!outputs) return complain(outputs.error());
   const auto grids = findGrids(*pack, record, request->grids);
   if (!grids) return complain(grids.error());
   const bool png = std::filesystem::path(request->output).extension() == ".png";
@@ -252,16 +252,29 @@ int runRender(const Arguments& arguments) {
   return done ? kDone : complain(done.error());
 }
 
+// CLI11's own ranges let NaN pass, and what single precision rounds to infinity.
+CLI::Validator finite() {
+  return CLI::Validator(
+      [](std::string& text) {
+        float number = 0;
+        const bool sound = CLI::detail::lexical_cast(text, number) && std::isfinite(number);
+        return sound ? std::string() : text + " is not a finite number";
+      },
+      "");
+}
+
 void addPictureOptions(CLI::App& command, Arguments& arguments) {
   command.add_option("--size", arguments.size, "Picture size in pixels, WIDTHxHEIGHT (default 960x540)");
   command.add_option("--camera", arguments.camera,
                      "Eye, target and field of view in degrees: x,y,z:x,y,z[:degrees]\n"
                      "(default: the whole sequence in view)");
   command.add_option("--fov", arguments.fieldOfView, "Vertical field of view in degrees (default 35)")
+      ->check(finite())
       ->check(CLI::Range(1.0, 170.0));
   command.add_option("--up", arguments.up, "Which axis is up (default: the one along which the gas rises, else z)")
       ->check(CLI::IsMember({"y", "z"}));
   command.add_option("--exposure", arguments.exposure, "PNG only: stops to brighten (or darken, below 0)")
+      ->check(finite())
       ->check(CLI::Range(-32.0, 32.0));
   command.add_option("--background", arguments.background,
                      "none, r,g,b, or r,g,b:r,g,b from bottom to top, linear\n"
@@ -269,12 +282,13 @@ void addPictureOptions(CLI::App& command, Arguments& arguments) {
   command.add_option("--filter", arguments.filter, "Between voxels (default trilinear)")
       ->check(CLI::IsMember({"nearest", "trilinear"}));
   command.add_option("--step", arguments.direct.step, "Length of a step in voxels (default 1)")
+      ->check(finite())
       ->check(CLI::Range(0.05, 16.0));
 }
 
 void addLightOptions(CLI::App& command, Arguments& arguments) {
   LookRequest& look = arguments.direct.look;
-  const auto positive = CLI::Range(0.0, 1e9);
+  const auto positive = finite() & CLI::Range(0.0, 1e9);
   command.add_option("--sun", arguments.sunDirection, "Direction to the sun, x,y,z");
   command.add_option("--sun-color", arguments.sunColor, "Linear r,g,b");
   command.add_option("--sun-intensity", arguments.direct.sunIntensity, "Irradiance")->check(positive);
@@ -289,10 +303,12 @@ void addLightOptions(CLI::App& command, Arguments& arguments) {
   command.add_option("--extinction-scale", look.extinctionScale, "Extinction per world unit and grid value")
       ->check(positive);
   command.add_option("--emission-scale", look.emissionScale, "Radiance per world unit and grid value")->check(positive);
-  command.add_option("--temperature-scale", look.temperatureScale, "Kelvin per grid value");
-  command.add_option("--temperature-offset", look.temperatureOffset, "Kelvin at grid value 0");
+  command.add_option("--temperature-scale", look.temperatureScale, "Kelvin per grid value")->check(finite());
+  command.add_option("--temperature-offset", look.temperatureOffset, "Kelvin at grid value 0")->check(finite());
   command.add_option("--albedo", arguments.albedo, "Of smoke, r,g,b in [0, 1]");
-  command.add_option("--anisotropy", look.anisotropy, "Henyey-Greenstein g of smoke")->check(CLI::Range(-0.99, 0.99));
+  command.add_option("--anisotropy", look.anisotropy, "Henyey-Greenstein g of smoke")
+      ->check(finite())
+      ->check(CLI::Range(-0.99, 0.99));
   command
       .add_option("--scattering-orders", look.scatteringOrders,
                   "1: single scattering; more imitate multiple scattering (default 4)")
@@ -301,7 +317,7 @@ void addLightOptions(CLI::App& command, Arguments& arguments) {
 
 void addSourceOptions(CLI::App& command, Arguments& arguments) {
   GridNames& grids = arguments.direct.grids;
-  command.add_option("--volume", arguments.direct.volume, "Which volume of the pack (default: the first)");
+  command.add_option("--volume", arguments.direct.volume, "The volume, where the pack has several");
   command.add_option("--extinction", grids.extinction, "Grid to take as smoke, or none (default: by the pack's roles)");
   command.add_option("--temperature", grids.temperature, "Grid to take as temperature, or none");
   command.add_option("--flames", grids.flames, "Grid to take as flames, or none");

@@ -21,7 +21,7 @@ namespace {
 
 // A fit of the ACES film curve (Narkowicz 2015, "ACES filmic tone mapping curve"); linear in, linear [0, 1] out.
 float filmic(float x) {
-  x = std::max(x, 0.0f);
+  x = x > 0 ? std::min(x, 1e6f) : 0;  // also of NaN, and no infinity over infinity
   return std::clamp(x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f), 0.0f, 1.0f);
 }
 

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <string_view>
@@ -41,11 +42,16 @@ std::optional<std::array<double, 3>> parseVector(std::string_view text) {
   return values;
 }
 
+bool within(const std::array<double, 3>& values, const Bounds& bounds) {
+  return std::all_of(values.begin(), values.end(),
+                     [&](double value) { return value >= bounds.low && value <= bounds.high; });
+}
+
 Triple toTriple(const std::array<double, 3>& v) {
   return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
 }
 
-tl::unexpected<Refusal> refuse(const char* option, const std::string& text, const char* expected) {
+tl::unexpected<Refusal> refuse(const char* option, const std::string& text, const std::string& expected) {
   return tl::unexpected(Refusal{kCommandLine, fmt::format("{} is \"{}\"; expected {}", option, text, expected)});
 }
 
@@ -103,16 +109,20 @@ Checked<void> parseBackground(const std::string& text, RenderRequest& request) {
   const auto parts = split(text, ':');
   const auto bottom = parseVector(parts.front());
   const auto top = parseVector(parts.back());
-  if (parts.size() > 2 || !bottom || !top) {
-    return refuse("--background", text, "none, r,g,b, or r,g,b:r,g,b (bottom and top, linear)");
+  const Bounds bounds{0, kLargest};
+  if (parts.size() > 2 || !bottom || !top || !within(*bottom, bounds) || !within(*top, bounds)) {
+    return refuse("--background", text, "none, r,g,b, or r,g,b:r,g,b (bottom and top, linear, each 0 or more)");
   }
   background = {BackgroundRequest::Kind::colors, toTriple(*bottom), toTriple(*top)};
   return {};
 }
 
-Checked<std::array<float, 3>> parseTriple(const std::string& text, const char* option) {
+Checked<Triple> parseTriple(const std::string& text, const char* option, const Bounds& bounds) {
   const auto vector = parseVector(text);
-  if (!vector) return refuse(option, text, "three numbers such as 1,0.5,0");
+  if (!vector || !within(*vector, bounds)) {
+    return refuse(option, text,
+                  fmt::format("three numbers such as 1,0.5,0, each from {} to {}", bounds.low, bounds.high));
+  }
   return toTriple(*vector);
 }
 

@@ -46,7 +46,7 @@ struct GridNames {
 
 struct RenderRequest {
   std::string pack;
-  std::optional<std::string> volume;  // default: the first
+  std::optional<std::string> volume;  // needed where the pack has several
   std::int32_t firstFrame = 0, lastFrame = 0;
   bool range = false;
   std::string output;
@@ -75,8 +75,12 @@ Checked<void> parseFrames(const std::string& text, RenderRequest& request);     
 Checked<void> parseSize(const std::string& text, RenderRequest& request);        // WxH
 Checked<void> parseCamera(const std::string& text, RenderRequest& request);      // x,y,z:x,y,z[:degrees]
 Checked<void> parseBackground(const std::string& text, RenderRequest& request);  // none, r,g,b or r,g,b:r,g,b
-Checked<std::array<float, 3>> parseTriple(const std::string& text, const char* option);
+struct Bounds {
+  double low, high;
+};
+Checked<Triple> parseTriple(const std::string& text, const char* option, const Bounds& bounds);
 
+inline constexpr double kLargest = 1e9;                  // of colours, intensities and components of a direction
 inline constexpr std::uint32_t kLargestPicture = 16384;  // pixels an edge
 
 }  // namespace billow::command

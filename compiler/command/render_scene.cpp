@@ -1,15 +1,12 @@
 #include <fmt/format.h>
 
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "billow/format/source.h"
 #include "command.h"
 #include "render_request.h"
 
@@ -91,8 +88,6 @@ class SceneReader {
   const std::string& path_;
 };
 
-constexpr double kLarge = 1e9;
-
 SceneReader::Member readCamera(const SceneReader& scene, RenderRequest& request) {
   return [&scene, &request](const json& value, const std::string& at) {
     CameraRequest& camera = request.camera;
@@ -113,9 +108,9 @@ SceneReader::Member readCamera(const SceneReader& scene, RenderRequest& request)
 SceneReader::Member readSun(const SceneReader& scene, RenderRequest& request) {
   return [&scene, &request](const json& value, const std::string& at) {
     scene.object(value, at,
-                 {{"direction", scene.into(request.sunDirection, -kLarge, kLarge)},
-                  {"color", scene.into(request.sunColor, 0, kLarge)},
-                  {"intensity", scene.into(request.sunIntensity, 0, kLarge)}});
+                 {{"direction", scene.into(request.sunDirection, -kLargest, kLargest)},
+                  {"color", scene.into(request.sunColor, 0, kLargest)},
+                  {"intensity", scene.into(request.sunIntensity, 0, kLargest)}});
     if (request.sunDirection == Triple{0, 0, 0}) scene.fail(at, value, "a direction that is not zero");
   };
 }
@@ -124,15 +119,15 @@ SceneReader::Member readLook(const SceneReader& scene, RenderRequest& request) {
   return [&scene, &request](const json& value, const std::string& at) {
     LookRequest& look = request.look;
     scene.object(value, at,
-                 {{"extinctionScale", scene.into(look.extinctionScale, 0, kLarge)},
+                 {{"extinctionScale", scene.into(look.extinctionScale, 0, kLargest)},
                   {"albedo", scene.into(look.albedo, 0, 1)},
                   {"anisotropy", scene.into(look.anisotropy, -0.99, 0.99)},
-                  {"emissionScale", scene.into(look.emissionScale, 0, kLarge)},
-                  {"temperatureScale", scene.into(look.temperatureScale, -kLarge, kLarge)},
-                  {"temperatureOffset", scene.into(look.temperatureOffset, -kLarge, kLarge)},
-                  {"ambient", scene.into(look.ambient, 0, kLarge)},
-                  {"density", scene.into(look.density, 0, kLarge)},
-                  {"fire", scene.into(look.fire, 0, kLarge)},
+                  {"emissionScale", scene.into(look.emissionScale, 0, kLargest)},
+                  {"temperatureScale", scene.into(look.temperatureScale, -kLargest, kLargest)},
+                  {"temperatureOffset", scene.into(look.temperatureOffset, -kLargest, kLargest)},
+                  {"ambient", scene.into(look.ambient, 0, kLargest)},
+                  {"density", scene.into(look.density, 0, kLargest)},
+                  {"fire", scene.into(look.fire, 0, kLargest)},
                   {"scatteringOrders", [&](const json& orders, const std::string& ordersAt) {
                      if (!orders.is_number_integer()) scene.fail(ordersAt, orders, "a whole number from 1 to 8");
                      look.scatteringOrders = static_cast<std::uint32_t>(scene.number(orders, ordersAt, 1, 8));
@@ -148,7 +143,7 @@ SceneReader::Member readBackground(const SceneReader& scene, RenderRequest& requ
       return;
     }
     std::optional<Triple> bottom, top;
-    scene.object(value, at, {{"bottom", scene.into(bottom, 0, kLarge)}, {"top", scene.into(top, 0, kLarge)}});
+    scene.object(value, at, {{"bottom", scene.into(bottom, 0, kLargest)}, {"top", scene.into(top, 0, kLargest)}});
     if (!bottom || !top) scene.fail(at, value, "both bottom and top");
     request.background = {BackgroundRequest::Kind::colors, *bottom, *top};
   };
@@ -205,17 +200,15 @@ void readDocument(const SceneReader& scene, const json& document, const std::str
 }  // namespace
 
 Checked<void> readScene(const std::string& path, RenderRequest& request) {
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  if (!file.is_open() || file.bad()) {
-    return tl::unexpected(Refusal{kFile, fmt::format("{}: cannot be read: {}", path, std::strerror(errno))});
-  }
+  const auto text = format::readTextFile(path);
+  if (!text) return tl::unexpected(Refusal{kFile, fmt::format("{}: cannot be read: {}", path, text.error().detail)});
   try {
     const SceneReader scene(path);
-    readDocument(scene, json::parse(text), path, request);
+    readDocument(scene, json::parse(*text), path, request);
   } catch (const json::parse_error& error) {
     return tl::unexpected(Refusal{kInvalid, fmt::format("{}: no JSON at byte {}", path, error.byte)});
+  } catch (const json::exception& error) {  // a number that no double holds
+    return tl::unexpected(Refusal{kInvalid, fmt::format("{}: not usable JSON: {}", path, error.what())});
   } catch (const Refusal& refusal) {
     return tl::unexpected(refusal);
   }

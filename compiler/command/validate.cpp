@@ -79,7 +79,10 @@ void printText(const Arguments& arguments, const Findings& found) {
 
 int runValidate(const Arguments& arguments) {
   const auto source = format::openFileSource(arguments.pack);
-  if (!source) return reportIssue(arguments.pack, source.error());
+  if (!source) {
+    if (arguments.outputFormat == "json") printJson(arguments, {{source.error()}, 1, 0, true}, false);
+    return reportIssue(arguments.pack, source.error());
+  }
   const Findings found = examine(**source, arguments);
   const bool valid = found.errors == 0 && (found.warnings == 0 || !arguments.warningsAsErrors);
   if (arguments.outputFormat == "json") {

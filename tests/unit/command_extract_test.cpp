@@ -128,6 +128,9 @@ TEST_F(Extract, ComplainsInOneLine) {
   run("extract '" + (folder_ / "s_4.vdb") + "' --frame 4" + output, 3);
   run("extract '" + pack() + "' --frame 4 -o '" + (folder_ / "no/x.vdb") + "'", 2);
   run("extract '" + pack() + "' --frame 4 -o /dev/null", 2);
+  const std::string before = readFile(pack());
+  run("extract '" + pack() + "' --frame 4 -o '" + pack() + "'", 1);
+  EXPECT_EQ(readFile(pack()), before);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "x.vdb"));
 }
 
@@ -158,6 +161,8 @@ TEST_F(Extract, TellsVolumesApart) {
   const auto report = nlohmann::json::parse(run("compare '" + two + "' '" + manifest + "' --json", 0).out);
   EXPECT_EQ(report.at("grids").size(), 7u);
   EXPECT_NE(run("extract '" + two + "' --frame 4 -o '" + output + "'", 1).err.find("one, two"), std::string::npos);
+  EXPECT_NE(run("render '" + two + "' --frame 4 -o '" + (folder_ / "x.png") + "'", 1).err.find("one, two"),
+            std::string::npos);
   run("extract '" + two + "' --volume one --frame 5 -o '" + output + "'", 1);
   run("extract '" + two + "' --volume two --frame 5 -o '" + output + "'", 0);
   EXPECT_EQ(importFile(output).first.grids.at(0).name, "warmth");
@@ -181,6 +186,25 @@ TEST_F(Extract, CompareFindsEveryDifference) {
   EXPECT_NE(compareWith(density, "density", "t_6.vdb").find("no such frame"), std::string::npos);
   density.background = 0.5f;
   EXPECT_NE(compareWith(density, "density", "t_4.vdb").find("background"), std::string::npos);
+}
+
+TEST_F(Extract, CompareGivesJsonWhateverTheNames) {
+  const std::string odd = folder_ / "odd\xff.blw";
+  std::filesystem::copy_file(pack(), odd);
+  EXPECT_TRUE(nlohmann::json::accept(run("compare '" + odd + "' '" + source() + "' --json", 0).out));
+}
+
+// A tile that ends where 32 bits do.
+TEST_F(Extract, TheLastTileOfTheIndexSpaceIsCompared) {
+  ImportedGrid grid;
+  grid.present = true;
+  constexpr std::int32_t kLast = 2147483647 - 127;
+  grid.tiles.push_back({{kLast, kLast, kLast}, 128, 0.5f});
+  compiler::writeVdb(folder_ / "far.vdb", std::vector<compiler::VdbOutput>{{"density", true, {&grid}}});
+  run("compile '" + (folder_ / "far.vdb") + "' -o '" + (folder_ / "far.blw") + "'", 0);
+  const auto report = nlohmann::json::parse(
+      run("compare '" + (folder_ / "far.blw") + "' '" + (folder_ / "far.vdb") + "' --json", 0).out);
+  EXPECT_EQ(report.at("grids").at(0).at("activeVoxels"), 128 * 128 * 128);
 }
 
 }  // namespace

@@ -82,6 +82,12 @@ TEST(ValidateCommand, ForeignAndMissingFiles) {
   const tests::TempFolder folder;
   EXPECT_EQ(tests::billow("validate '" + (folder / "none.blw") + "'").code, 2);
   EXPECT_EQ(tests::billow("validate '" + folder.path().string() + "'").code, 2);
+  const CommandResult json = tests::billow("validate --format json '" + (folder / "none.blw") + "'");
+  EXPECT_EQ(json.code, 2);
+  const auto report = nlohmann::json::parse(json.out);
+  EXPECT_EQ(report["valid"], false);
+  ASSERT_EQ(report["issues"].size(), 1u);
+  EXPECT_EQ(report["issues"][0]["id"], 1);
   EXPECT_EQ(tests::billow("info '" + (folder / "none.blw") + "'").code, 2);
 }
 

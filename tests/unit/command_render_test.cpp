@@ -147,6 +147,7 @@ TEST_F(Render, ScenesSayWhatTheCommandLineSays) {
 TEST_F(Render, SceneErrorsNameTheirPlace) {
   expectSceneRefused("{", "no JSON");
   expectSceneRefused("[]", "an object");
+  expectSceneRefused(R"({"pack": "p.blw", "exposure": 1e999})", "scene.json");
   expectSceneRefused("{}", "pack is missing");
   expectSceneRefused(R"({"pack": "p.blw", "colour": 1})", "colour is not known");
   expectSceneRefused(R"({"pack": "p.blw", "camera": {"fieldOfView": 200}})", "camera.fieldOfView is 200");
@@ -180,8 +181,26 @@ TEST_F(Render, RefusesWhatItCannotDo) {
   expectRefused("'" + pack_ + "' --frame 7 -o '" + (folder_ / "no/x.png") + "'", 2, "no/x.png");
   expectRefused("'" + pack_ + "' --frame 7 --gpu-budget 1000" + out, 4, "budget");
   expectRefused("'" + pack_ + "' --frame 7 --device 99" + out, 4, "device 99");
+  for (const char* option : {"--albedo 0,2,0", "--ambient 0,-1,0", "--sun-color -1,0,0", "--background 0,0,-1",
+                             "--background 0,0,0:0,-1,0"}) {
+    expectRefused("'" + pack_ + "' --frame 7 " + option + out, 1, std::string(option).substr(0, 5));
+  }
+  for (const char* option : {"--fov nan", "--exposure nan", "--step nan", "--density nan", "--sun-intensity nan",
+                             "--anisotropy nan", "--temperature-scale inf", "--temperature-offset 1e39"}) {
+    expectRefused("'" + pack_ + "' --frame 7 " + option + out, 1, "not a finite number");
+  }
+  std::filesystem::create_directory(folder_ / "folder.json");
+  expectRefused("'" + (folder_ / "folder.json") + "' --frame 7" + out, 2, "folder.json");
   writeFile(folder_ / "text.blw", "no pack");
   expectRefused("'" + (folder_ / "text.blw") + "' --frame 7" + out, 3, "text.blw");
+}
+
+TEST_F(Render, NeverReplacesItsInput) {
+  const std::string before = readFile(pack_), disguised = folder_ / "pack_0007.png";
+  std::filesystem::create_hard_link(pack_, disguised);
+  expectRefused("'" + pack_ + "' --frame 7 -o '" + disguised + "'", 1, "the input itself");
+  expectRefused("'" + pack_ + "' --frame 7-8 -o '" + (folder_ / "pack.png") + "'", 1, "the input itself");
+  EXPECT_EQ(readFile(disguised), before);
 }
 
 TEST_F(Render, SaysThatThereIsNoGpu) {

@@ -1,0 +1,52 @@
+#include "pack_lookup.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <system_error>
+#include <vector>
+
+namespace billow::command {
+
+tl::expected<std::uint32_t, std::string> findVolume(const format::Pack& pack, const std::string& name) {
+  const auto volumes = pack.volumes();
+  if (name.empty() && volumes.size() == 1) return 0;
+  std::vector<std::string_view> names;
+  for (std::uint32_t i = 0; i < volumes.size(); ++i) {
+    names.push_back(pack.string(volumes[i].name));
+    if (names.back() == name) return i;
+  }
+  return tl::unexpected(
+      name.empty()
+          ? fmt::format("the pack has {} volumes; choose one with --volume: {}", names.size(), fmt::join(names, ", "))
+          : fmt::format("--volume {}: no such volume; there is: {}", name, fmt::join(names, ", ")));
+}
+
+std::ptrdiff_t findFrame(const format::Pack& pack, const format::VolumeRecord& volume, std::int32_t number) {
+  const auto frames = pack.framesOf(volume);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (frames[i].number == number) return static_cast<std::ptrdiff_t>(i);
+  }
+  return -1;
+}
+
+std::ptrdiff_t findGrid(const format::Pack& pack, const format::VolumeRecord& volume, const std::string& name) {
+  const auto grids = pack.gridsOf(volume);
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    if (pack.string(grids[i].name) == name) return static_cast<std::ptrdiff_t>(i);
+  }
+  return -1;
+}
+
+std::string gridNames(const format::Pack& pack, const format::VolumeRecord& volume) {
+  std::vector<std::string_view> names;
+  for (const format::GridRecord& grid : pack.gridsOf(volume)) names.push_back(pack.string(grid.name));
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+bool sameFile(const std::filesystem::path& a, const std::filesystem::path& b) {
+  std::error_code ignored;
+  return std::filesystem::equivalent(a, b, ignored);
+}
+
+}  // namespace billow::command
