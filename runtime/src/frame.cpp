@@ -23,9 +23,13 @@ std::array<std::span<const std::byte>, 5> sectionsOf(const GpuGrid& grid) {
   return {bytesOf(grid.table), bytesOf(grid.records), bytesOf(grid.masks), bytesOf(grid.node4), bytesOf(grid.children)};
 }
 
+bool resident(const format::GridFrame& gridFrame) {
+  return (gridFrame.flags & format::kGridPresent) != 0 && gridFrame.node5 != format::kNone;
+}
+
 Result<void> stageGrid(StagedFrame& staged, std::uint32_t slot, const format::Pack& pack,
                        const format::GridFrame& gridFrame, Index index) {
-  if ((gridFrame.flags & format::kGridPresent) == 0 || gridFrame.node5 == format::kNone) return {};
+  if (!resident(gridFrame)) return {};
   auto view = format::GridView::load(pack, gridFrame);
   if (!view) {
     return tl::unexpected(Error{.code = ErrorCode::pack, .message = toString(view.error()), .issue = view.error()});
@@ -159,7 +163,41 @@ Result<void> bindObjects(FrameObjects& objects) {
   return objects.staging.bind(Placement::mapped);
 }
 
+// Grid numbers by slot, each the volume's or kNone.
+Result<std::array<std::uint32_t, gpu::kGridSlots>> slotNumbers(const format::Pack& pack,
+                                                               const format::VolumeRecord& volume,
+                                                               const UploadOptions& options) {
+  const GridChoice choice = options.grids.value_or(chooseGrids(pack, volume));
+  const std::array<std::uint32_t, gpu::kGridSlots> numbers{choice.extinction, choice.temperature, choice.flames};
+  for (const std::uint32_t number : numbers) {
+    if (number == format::kNone || number < volume.gridCount) continue;
+    return failure(ErrorCode::argument, "the volume has no such grid");
+  }
+  return numbers;
+}
+
 }  // namespace
+
+FrameIndices ResidentFrame::indices() const {
+  FrameIndices indices;
+  for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
+    if (grids_[slot].present) indices[slot] = grids_[slot].index;
+  }
+  return indices;
+}
+
+Result<FrameIndices> frameIndices(const format::Pack& pack, const format::VolumeRecord& volume, std::uint32_t frame,
+                                  const UploadOptions& options) {
+  const auto numbers = slotNumbers(pack, volume, options);
+  if (!numbers) return tl::unexpected(numbers.error());
+  FrameIndices indices;
+  for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
+    if ((*numbers)[slot] == format::kNone) continue;
+    const format::GridFrame& gridFrame = pack.gridFrame(volume, frame, (*numbers)[slot]);
+    if (resident(gridFrame)) indices[slot] = chooseIndex(gridFrame, options.index);
+  }
+  return indices;
+}
 
 bool ResidentFrame::empty() const {
   return std::none_of(grids_.begin(), grids_.end(), [](const ResidentGrid& grid) { return grid.present; });
@@ -170,16 +208,16 @@ Result<StagedFrame> stageFrame(const Device& device, const format::Pack& pack, s
   if (volume >= pack.volumes().size()) return failure(ErrorCode::argument, "the pack has no such volume");
   const format::VolumeRecord& record = pack.volumes()[volume];
   if (frame >= record.frameCount) return failure(ErrorCode::argument, "the volume has no such frame");
-  const GridChoice choice = options.grids.value_or(chooseGrids(pack, record));
-  const std::uint32_t numbers[gpu::kGridSlots] = {choice.extinction, choice.temperature, choice.flames};
+  const auto numbers = slotNumbers(pack, record, options);
+  if (!numbers) return tl::unexpected(numbers.error());
   StagedFrame staged{
       .views = {}, .grids = {}, .shapes = {}, .slots = BrickSlots(device.bc7, device.bc4), .bufferBytes = 0};
   // Views must not move while bricks and masks are read from them.
   staged.views.reserve(gpu::kGridSlots);
   for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
-    if (numbers[slot] == format::kNone) continue;
-    if (numbers[slot] >= record.gridCount) return failure(ErrorCode::argument, "the volume has no such grid");
-    const auto done = stageGrid(staged, slot, pack, pack.gridFrame(record, frame, numbers[slot]), options.index);
+    const std::uint32_t number = (*numbers)[slot];
+    if (number == format::kNone) continue;
+    const auto done = stageGrid(staged, slot, pack, pack.gridFrame(record, frame, number), options.index);
     if (!done) return tl::unexpected(done.error());
   }
   const auto shaped = shapeAtlases(staged, device.maxImageExtent3D);

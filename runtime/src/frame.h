@@ -24,11 +24,15 @@ struct ResidentGrid {
   VkDeviceAddress table = 0, records = 0, masks = 0, node4 = 0, children = 0;
 };
 
+// By slot: the index of each grid that the frame has; pipelines are made for it.
+using FrameIndices = std::array<std::optional<Index>, gpu::kGridSlots>;
+
 class ResidentFrame final : public Frame {
  public:
   const FrameStats& stats() const override { return stats_; }
   std::uint64_t uploadValue() const override { return uploadValue_; }
   bool empty() const override;
+  FrameIndices indices() const;
 
   FrameStats stats_;
   std::uint64_t uploadValue_ = 0;
@@ -48,6 +52,10 @@ struct StagedFrame {
   BrickSlots slots;
   std::uint64_t bufferBytes = 0;
 };
+
+// What indices() will be of the frame once it is resident. Reads no page.
+Result<FrameIndices> frameIndices(const format::Pack& pack, const format::VolumeRecord& volume, std::uint32_t frame,
+                                  const UploadOptions& options);
 
 // Loads and checks the grids, builds indices and gives out slots. Allocates nothing on the device.
 Result<StagedFrame> stageFrame(const Device& device, const format::Pack& pack, std::uint32_t volume,

@@ -100,12 +100,12 @@ std::vector<Region> gatherRegions(const GridView& view, const format::CellBox& c
   return regions;
 }
 
+}  // namespace
+
 Index chooseIndex(const format::GridFrame& frame, Index wanted) {
   if (wanted != Index::automatic) return wanted;
   return format::gpuBytes(frame).index == format::GpuIndex::flat ? Index::flat : Index::tree;
 }
-
-}  // namespace
 
 BrickStore storeOf(std::uint32_t encoding) {
   if (encoding <= format::kEncodingBc7X) return BrickStore::bc7;

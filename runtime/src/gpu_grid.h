@@ -62,6 +62,8 @@ struct GpuGrid {
   std::uint64_t indexBytes() const { return 4 * (table.size() + node4.size() + children.size()); }
 };
 
+// The index that buildGpuGrid() will use: the frame's record alone says which.
+Index chooseIndex(const format::GridFrame& frame, Index wanted);
 GpuGrid buildGpuGrid(const format::GridView& view, Index wanted, BrickSlots& slots);
 
 }  // namespace billow::runtime

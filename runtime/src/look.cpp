@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "billow/format/affine.h"
 #include "billow/format/grid_view.h"
 
 namespace billow::runtime {
@@ -24,10 +25,7 @@ struct Amount {
 };
 
 double voxelSize(const format::GridFrame& frame) {
-  const double(&m)[12] = frame.indexToWorld;
-  const double determinant =
-      m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);
-  return std::cbrt(std::abs(determinant));
+  return std::cbrt(std::abs(format::determinant(frame.indexToWorld)));
 }
 
 Amount measure(const format::GridView& view) {

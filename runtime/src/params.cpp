@@ -3,6 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "billow/format/affine.h"
+
 namespace billow::runtime {
 namespace {
 
@@ -21,19 +23,14 @@ gpu::uvec4 addresses(VkDeviceAddress a, VkDeviceAddress b) {
   return {low(a), high(a), low(b), high(b)};
 }
 
-Result<void> addFrame(const ResidentFrame& frame, const std::array<double, 3>& eye, Filter filter,
-                      gpu::MarchParams& params) {
+void addFrame(const ResidentFrame& frame, const std::array<double, 3>& eye, Filter widest, gpu::MarchParams& params) {
   std::uint32_t shifts[kAtlasCount];
   for (std::uint32_t i = 0; i < kAtlasCount; ++i) shifts[i] = frame.shapes_[i].xBits | frame.shapes_[i].yBits << 8;
   const gpu::uvec4 blocks = addresses(frame.blocks_, 0);
   params.atlas = {shifts[0], shifts[1], blocks.x, blocks.y};
   for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
-    if (!frame.grids_[slot].present) continue;
-    const auto grid = gridParams(frame.grids_[slot], eye, filter);
-    if (!grid) return tl::unexpected(grid.error());
-    params.grids[slot] = *grid;
+    if (frame.grids_[slot].present) params.grids[slot] = gridParams(frame.grids_[slot], eye, widest);
   }
-  return {};
 }
 
 void addView(const DrawInfo& draw, gpu::MarchParams& params) {
@@ -60,32 +57,9 @@ void addLook(const DrawInfo& draw, gpu::MarchParams& params) {
 
 }  // namespace
 
-bool invertAffine(const double (&m)[12], double (&inverse)[12]) {
-  const auto minor = [&m](int r0, int r1, int c0, int c1) {
-    return m[r0 * 4 + c0] * m[r1 * 4 + c1] - m[r0 * 4 + c1] * m[r1 * 4 + c0];
-  };
-  const double determinant = m[0] * minor(1, 2, 1, 2) - m[1] * minor(1, 2, 0, 2) + m[2] * minor(1, 2, 0, 1);
-  if (!(std::abs(determinant) > 0) || !std::isfinite(1 / determinant)) return false;
-  const double cofactors[9] = {minor(1, 2, 1, 2),  -minor(0, 2, 1, 2), minor(0, 1, 1, 2),
-                               -minor(1, 2, 0, 2), minor(0, 2, 0, 2),  -minor(0, 1, 0, 2),
-                               minor(1, 2, 0, 1),  -minor(0, 2, 0, 1), minor(0, 1, 0, 1)};
-  for (int row = 0; row < 3; ++row) {
-    double translation = 0;
-    for (int column = 0; column < 3; ++column) {
-      const double value = cofactors[row * 3 + column] / determinant;
-      inverse[row * 4 + column] = value;
-      translation -= value * m[column * 4 + 3];
-    }
-    inverse[row * 4 + 3] = translation;
-  }
-  return true;
-}
-
-Result<gpu::GridParams> gridParams(const ResidentGrid& grid, const std::array<double, 3>& eye, Filter filter) {
+gpu::GridParams gridParams(const ResidentGrid& grid, const std::array<double, 3>& eye, Filter widest) {
   double toIndex[12];
-  if (!invertAffine(grid.frame.indexToWorld, toIndex)) {
-    return failure(ErrorCode::pack, "a grid's index-to-world matrix has no inverse");
-  }
+  format::invert(grid.frame.indexToWorld, toIndex);  // rule 217: it can be turned round
   gpu::GridParams params{};
   params.tableAndRecords = addresses(grid.table, grid.records);
   params.masksAndNode4 = addresses(grid.masks, grid.node4);
@@ -96,7 +70,7 @@ Result<gpu::GridParams> gridParams(const ResidentGrid& grid, const std::array<do
   params.cellMin = {cell(min[0]), cell(min[1]), cell(min[2]), static_cast<std::int32_t>(grid.index)};
   params.cellDim = {cell(dim[0]), cell(dim[1]), cell(dim[2]), cell(grid.absent5)};
   // How far an active voxel's value reaches from its centre.
-  const float reach = filter == Filter::trilinear ? 1.0f : 0.5f;
+  const float reach = widest == Filter::trilinear ? 1.0f : 0.5f;
   const auto low = [&](int axis) { return static_cast<float>(grid.frame.activeMin[axis]) - reach; };
   const auto high = [&](int axis) { return static_cast<float>(grid.frame.activeMax[axis]) + reach; };
   params.boxMin = {low(0), low(1), low(2), grid.frame.background};
@@ -109,19 +83,19 @@ Result<gpu::GridParams> gridParams(const ResidentGrid& grid, const std::array<do
   return params;
 }
 
-Result<gpu::MarchParams> marchParams(const ResidentFrame& frame, const DrawInfo& draw) {
+gpu::MarchParams marchParams(const ResidentFrame& frame, const DrawInfo& draw) {
   gpu::MarchParams params{};
   addView(draw, params);
   addLook(draw, params);
-  if (auto added = addFrame(frame, draw.view.eye, draw.quality.filter, params); !added) {
-    return tl::unexpected(added.error());
-  }
+  // One box serves both marches.
+  const bool wide = draw.quality.filter == Filter::trilinear || draw.quality.shadows == Filter::trilinear;
+  addFrame(frame, draw.view.eye, wide ? Filter::trilinear : Filter::nearest, params);
   return params;
 }
 
-Result<gpu::MarchParams> lookupParams(const ResidentFrame& frame, Filter filter) {
+gpu::MarchParams lookupParams(const ResidentFrame& frame, Filter filter) {
   gpu::MarchParams params{};
-  if (auto added = addFrame(frame, {0, 0, 0}, filter, params); !added) return tl::unexpected(added.error());
+  addFrame(frame, {0, 0, 0}, filter, params);
   return params;
 }
 

@@ -6,13 +6,10 @@
 
 namespace billow::runtime {
 
-// Fails when a grid's index-to-world matrix has no inverse.
-Result<gpu::GridParams> gridParams(const ResidentGrid& grid, const std::array<double, 3>& eye, Filter filter);
-Result<gpu::MarchParams> marchParams(const ResidentFrame& frame, const DrawInfo& draw);
-Result<gpu::MarchParams> lookupParams(const ResidentFrame& frame, Filter filter);
-
-// World from index (3x4 row-major) turned round; false where it has no inverse.
-bool invertAffine(const double (&m)[12], double (&inverse)[12]);
+// `widest` is the filter that reaches farthest of those that will read the grid.
+gpu::GridParams gridParams(const ResidentGrid& grid, const std::array<double, 3>& eye, Filter widest);
+gpu::MarchParams marchParams(const ResidentFrame& frame, const DrawInfo& draw);
+gpu::MarchParams lookupParams(const ResidentFrame& frame, Filter filter);
 
 }  // namespace billow::runtime
 

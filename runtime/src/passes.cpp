@@ -26,15 +26,15 @@ std::span<const std::uint32_t> spirvOf(Shader shader) {
 
 }  // namespace
 
-PassKey passKey(const ResidentFrame& frame, Shader shader, Filter filter, Filter shadow) {
+PassKey passKey(const FrameIndices& indices, Shader shader, Filter filter, Filter shadow) {
   PassKey key{.shader = shader,
               .index = gpu::kIndexMixed,
               .filter = static_cast<std::uint32_t>(filter),
               .shadow = static_cast<std::uint32_t>(shadow),
               .grids = 0};
   for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
-    if (!frame.grids_[slot].present) continue;
-    const std::uint32_t index = static_cast<std::uint32_t>(frame.grids_[slot].index);
+    if (!indices[slot]) continue;
+    const std::uint32_t index = static_cast<std::uint32_t>(*indices[slot]);
     key.index = key.grids == 0 || key.index == index ? index : gpu::kIndexMixed;
     key.grids |= 1u << slot;
   }
@@ -101,10 +101,11 @@ Result<void> Passes::createSets() {
 }
 
 Result<VkPipeline> Passes::pipeline(const PassKey& key) {
-  const auto found = pipelines_.find(key);
-  if (found != pipelines_.end()) return found->second;
+  // The place first, so that no pipeline is lost where there is no memory for it.
+  VkPipeline& place = pipelines_[key];
+  if (place != VK_NULL_HANDLE) return place;
   auto made = compile(key);
-  if (made) pipelines_[key] = *made;
+  if (made) place = *made;
   return made;
 }
 
@@ -128,7 +129,7 @@ Result<VkPipeline> Passes::compile(const PassKey& key) {
   info.stage.pSpecializationInfo = &specialization;
   info.layout = pipelineLayout_;
   VkPipeline pipeline = VK_NULL_HANDLE;
-  result = device_.api.vkCreateComputePipelines(device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline);
+  result = device_.api.vkCreateComputePipelines(device, device_.host.pipelineCache, 1, &info, nullptr, &pipeline);
   device_.api.vkDestroyShaderModule(device, module, nullptr);
   if (result != VK_SUCCESS) return vulkanError("vkCreateComputePipelines", result);
   return pipeline;

@@ -25,7 +25,7 @@ struct PassKey {
   }
 };
 
-PassKey passKey(const ResidentFrame& frame, Shader shader, Filter filter, Filter shadow);
+PassKey passKey(const FrameIndices& indices, Shader shader, Filter filter, Filter shadow);
 
 class Passes {
  public:

@@ -1,5 +1,10 @@
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <new>
+#include <stdexcept>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "billow/runtime/runtime.h"
@@ -41,23 +46,68 @@ bool finite(const std::array<float, 3>& v) {
   return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
 }
 
-// Names the first field that is outside of what runtime.h allows, or null.
+// Whether low <= each <= high; a NaN is not.
+bool within(const std::array<float, 3>& v, float low, float high) {
+  return std::all_of(v.begin(), v.end(), [&](float value) { return value >= low && value <= high; });
+}
+
+bool positive(float value) {
+  return std::isfinite(value) && value > 0;
+}
+
+// These name the first field that is outside of what runtime.h allows, or give null.
+const char* badView(const View& view) {
+  if (!std::all_of(view.eye.begin(), view.eye.end(), [](double at) { return std::isfinite(at); })) return "view.eye";
+  if (!finite(view.right) || !finite(view.up) || !finite(view.forward)) return "view.right, up, forward";
+  return positive(view.tanHalfHeight) ? nullptr : "view.tanHalfHeight";
+}
+
+const char* badLight(const DrawInfo& draw) {
+  const std::array<float, 3>& sun = draw.sun.direction;
+  if (!finite(sun) || sun == std::array<float, 3>{0, 0, 0}) return "sun.direction";
+  if (!within(draw.sun.irradiance, 0, std::numeric_limits<float>::max())) return "sun.irradiance";
+  if (!finite(draw.background.bottom) || !finite(draw.background.top)) return "background.bottom, top";
+  return draw.background.opacity >= 0 && draw.background.opacity <= 1 ? nullptr : "background.opacity";
+}
+
+const char* badLook(const Look& look) {
+  if (!within(look.albedo, 0, 1)) return "look.albedo";
+  if (!(std::abs(look.anisotropy) < 1)) return "look.anisotropy";
+  if (!finite(look.ambient)) return "look.ambient";
+  if (look.scatteringOrders < 1 || look.scatteringOrders > 8) return "look.scatteringOrders";
+  if (!positive(look.heatMax)) return "look.heatMax";
+  return positive(look.referenceKelvin) ? nullptr : "look.referenceKelvin";
+}
+
+const char* badQuality(const Quality& quality) {
+  const auto step = [](float voxels) { return std::isfinite(voxels) && voxels >= kLeastStep; };
+  if (!step(quality.step)) return "quality.step";
+  if (!step(quality.shadowStep) || quality.shadowSteps == 0) return "quality.shadowStep, shadowSteps";
+  return quality.filter == Filter::none ? "quality.filter" : nullptr;
+}
+
 const char* badField(const DrawInfo& draw) {
-  const auto positive = [](float value) { return std::isfinite(value) && value > 0; };
   if (draw.frame == nullptr) return "frame";
   if (draw.width == 0 || draw.height == 0) return "width, height";
   if (draw.color == VK_NULL_HANDLE || draw.depth == VK_NULL_HANDLE) return "color, depth";
-  if (!positive(draw.view.tanHalfHeight)) return "view.tanHalfHeight";
-  const std::array<float, 3>& sun = draw.sun.direction;
-  if (!finite(sun) || sun == std::array<float, 3>{0, 0, 0}) return "sun.direction";
-  if (!(std::abs(draw.look.anisotropy) < 1)) return "look.anisotropy";
-  if (draw.look.scatteringOrders < 1 || draw.look.scatteringOrders > 8) return "look.scatteringOrders";
-  if (!positive(draw.look.heatMax)) return "look.heatMax";
-  if (!positive(draw.look.referenceKelvin)) return "look.referenceKelvin";
-  if (!positive(draw.quality.step)) return "quality.step";
-  if (!positive(draw.quality.shadowStep) || draw.quality.shadowSteps == 0) return "quality.shadowStep, shadowSteps";
-  if (draw.quality.filter == Filter::none) return "quality.filter";
+  for (const char* field : {badView(draw.view), badLight(draw), badLook(draw.look), badQuality(draw.quality)}) {
+    if (field != nullptr) return field;
+  }
   return nullptr;
+}
+
+// What work() returns, or ErrorCode::memory where the standard library threw.
+template <class T, class Work>
+Result<T> guarded(const Work& work) {
+  try {
+    return work();
+  } catch (const std::bad_alloc&) {
+    return tl::unexpected(Error{.code = ErrorCode::memory, .message = "out of memory"});
+  } catch (const std::length_error&) {
+    return tl::unexpected(Error{.code = ErrorCode::memory, .message = "out of memory"});
+  } catch (const std::system_error&) {
+    return tl::unexpected(Error{.code = ErrorCode::memory, .message = "system error"});
+  }
 }
 
 class RendererImpl final : public Renderer {
@@ -75,34 +125,65 @@ class RendererImpl final : public Renderer {
 
   Result<std::unique_ptr<Frame>> upload(const format::Pack& pack, std::uint32_t volume, std::uint32_t frame,
                                         const UploadOptions& options) override {
-    uploads_.collect();
-    const auto staged = stageFrame(device_, pack, volume, frame, options);
-    if (!staged) return tl::unexpected(staged.error());
-    auto objects = makeFrameObjects(device_, *staged);
-    if (!objects) return tl::unexpected(objects.error());
-    if (auto done = uploads_.submit(*objects); !done) return tl::unexpected(done.error());
-    return std::unique_ptr<Frame>(std::move(objects->frame));
+    return guarded<std::unique_ptr<Frame>>([&]() -> Result<std::unique_ptr<Frame>> {
+      uploads_.collect();
+      const auto staged = stageFrame(device_, pack, volume, frame, options);
+      if (!staged) return tl::unexpected(staged.error());
+      auto objects = makeFrameObjects(device_, *staged);
+      if (!objects) return tl::unexpected(objects.error());
+      if (auto done = uploads_.submit(*objects); !done) return tl::unexpected(done.error());
+      return std::unique_ptr<Frame>(std::move(objects->frame));
+    });
+  }
+
+  Result<void> prepare(const format::Pack& pack, std::uint32_t volume, const UploadOptions& options,
+                       const Quality& quality, ColorFormat colorFormat) override {
+    return guarded<void>([&]() -> Result<void> {
+      if (const char* field = badQuality(quality)) return failure(ErrorCode::argument, badMessage(field));
+      if (volume >= pack.volumes().size()) return failure(ErrorCode::argument, "the pack has no such volume");
+      for (std::uint32_t frame = 0; frame < pack.volumes()[volume].frameCount; ++frame) {
+        const auto indices = frameIndices(pack, pack.volumes()[volume], frame, options);
+        if (!indices) return tl::unexpected(indices.error());
+        const auto made = passes_.pipeline(passKey(*indices, marchOf(colorFormat), quality.filter, quality.shadows));
+        if (!made) return tl::unexpected(made.error());
+      }
+      return {};
+    });
   }
 
   VkSemaphore uploadSemaphore() const override { return uploads_.semaphore(); }
 
   Result<void> record(VkCommandBuffer commands, const DrawInfo& draw) override {
-    if (const char* field = badField(draw)) {
-      return failure(ErrorCode::argument, std::string("DrawInfo: ") + field + " is outside of its range");
-    }
+    return guarded<void>([&] { return recordMarch(commands, draw); });
+  }
+
+  Result<void> recordLookup(VkCommandBuffer commands, const LookupInfo& lookup) override {
+    return guarded<void>([&] { return recordVoxels(commands, lookup); });
+  }
+
+  std::uint64_t bytesInUse() const override { return device_.used; }
+
+ private:
+  static std::string badMessage(const char* field) {
+    return std::string("DrawInfo: ") + field + " is outside of its range";
+  }
+  static Shader marchOf(ColorFormat format) {
+    return format == ColorFormat::half ? Shader::marchHalf : Shader::marchSingle;
+  }
+
+  Result<void> recordMarch(VkCommandBuffer commands, const DrawInfo& draw) {
+    if (const char* field = badField(draw)) return failure(ErrorCode::argument, badMessage(field));
     const auto& frame = static_cast<const ResidentFrame&>(*draw.frame);
-    const Shader shader = draw.colorFormat == ColorFormat::half ? Shader::marchHalf : Shader::marchSingle;
-    const auto pipeline = passes_.pipeline(passKey(frame, shader, draw.quality.filter, draw.quality.shadows));
+    const PassKey key = passKey(frame.indices(), marchOf(draw.colorFormat), draw.quality.filter, draw.quality.shadows);
+    const auto pipeline = passes_.pipeline(key);
     if (!pipeline) return tl::unexpected(pipeline.error());
-    const auto params = marchParams(frame, draw);
-    if (!params) return tl::unexpected(params.error());
-    passes_.bind(commands, frame, *params, draw.color, draw.depth);
+    passes_.bind(commands, frame, marchParams(frame, draw), draw.color, draw.depth);
     device_.api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, *pipeline);
     device_.api.vkCmdDispatch(commands, (draw.width + 7) / 8, (draw.height + 7) / 8, 1);
     return {};
   }
 
-  Result<void> recordLookup(VkCommandBuffer commands, const LookupInfo& lookup) override {
+  Result<void> recordVoxels(VkCommandBuffer commands, const LookupInfo& lookup) {
     const auto* frame = static_cast<const ResidentFrame*>(lookup.frame);
     if (frame == nullptr || lookup.slot >= gpu::kGridSlots || !frame->grids_[lookup.slot].present) {
       return failure(ErrorCode::argument, "LookupInfo: the frame has no grid in this slot");
@@ -111,11 +192,10 @@ class RendererImpl final : public Renderer {
     if (lookup.count == 0 || lookup.count > 65535 * 64) {
       return failure(ErrorCode::argument, "LookupInfo: count is outside of its range");
     }
-    const auto pipeline = passes_.pipeline(passKey(*frame, Shader::voxels, lookup.filter, Filter::none));
+    if (lookup.filter == Filter::none) return failure(ErrorCode::argument, "LookupInfo: filter is none");
+    const auto pipeline = passes_.pipeline(passKey(frame->indices(), Shader::voxels, lookup.filter, Filter::none));
     if (!pipeline) return tl::unexpected(pipeline.error());
-    const auto params = lookupParams(*frame, lookup.filter);
-    if (!params) return tl::unexpected(params.error());
-    passes_.bind(commands, *frame, *params, VK_NULL_HANDLE, VK_NULL_HANDLE);
+    passes_.bind(commands, *frame, lookupParams(*frame, lookup.filter), VK_NULL_HANDLE, VK_NULL_HANDLE);
     const auto low = [](VkDeviceAddress x) { return static_cast<std::uint32_t>(x & 0xffffffffu); };
     const auto high = [](VkDeviceAddress x) { return static_cast<std::uint32_t>(x >> 32); };
     const std::uint32_t push[6] = {low(lookup.positions), high(lookup.positions), low(lookup.values),
@@ -126,9 +206,6 @@ class RendererImpl final : public Renderer {
     return {};
   }
 
-  std::uint64_t bytesInUse() const override { return device_.used; }
-
- private:
   Device device_;
   Passes passes_;
   Uploads uploads_;
@@ -141,11 +218,13 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const HostDevice& host, const
     return failure(ErrorCode::argument, "HostDevice: a handle is missing");
   }
   if (config.recordsInFlight == 0) return failure(ErrorCode::argument, "Config: recordsInFlight is 0");
-  const auto api = loadApi(host);
-  if (!api) return tl::unexpected(api.error());
-  auto renderer = std::make_unique<RendererImpl>(host, *api, config);
-  if (auto ready = renderer->initialise(config); !ready) return tl::unexpected(ready.error());
-  return std::unique_ptr<Renderer>(std::move(renderer));
+  return guarded<std::unique_ptr<Renderer>>([&]() -> Result<std::unique_ptr<Renderer>> {
+    const auto api = loadApi(host);
+    if (!api) return tl::unexpected(api.error());
+    auto renderer = std::make_unique<RendererImpl>(host, *api, config);
+    if (auto ready = renderer->initialise(config); !ready) return tl::unexpected(ready.error());
+    return std::unique_ptr<Renderer>(std::move(renderer));
+  });
 }
 
 }  // namespace billow::runtime

@@ -85,17 +85,10 @@ void Uploads::collect() {
   });
 }
 
-Result<VkCommandBuffer> Uploads::record(const FrameObjects& objects) {
-  auto info = begin<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
-  info.commandPool = pool_;
-  info.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
-  info.commandBufferCount = 1;
-  VkCommandBuffer commands = VK_NULL_HANDLE;
-  VkResult result = device_.api.vkAllocateCommandBuffers(device_.host.device, &info, &commands);
-  if (result != VK_SUCCESS) return vulkanError("vkAllocateCommandBuffers", result);
+Result<void> Uploads::record(VkCommandBuffer commands, const FrameObjects& objects) const {
   auto beginInfo = begin<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
   beginInfo.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
-  result = device_.api.vkBeginCommandBuffer(commands, &beginInfo);
+  VkResult result = device_.api.vkBeginCommandBuffer(commands, &beginInfo);
   if (result != VK_SUCCESS) return vulkanError("vkBeginCommandBuffer", result);
   const ResidentFrame& frame = *objects.frame;
   changeLayouts(device_.api, commands, frame, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
@@ -104,14 +97,12 @@ Result<VkCommandBuffer> Uploads::record(const FrameObjects& objects) {
                 VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
   result = device_.api.vkEndCommandBuffer(commands);
   if (result != VK_SUCCESS) return vulkanError("vkEndCommandBuffer", result);
-  return commands;
+  return {};
 }
 
-Result<void> Uploads::submit(FrameObjects& objects) {
-  const auto commands = record(objects);
-  if (!commands) return tl::unexpected(commands.error());
+Result<void> Uploads::queue(VkCommandBuffer commands) {
   auto commandInfo = begin<VkCommandBufferSubmitInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO);
-  commandInfo.commandBuffer = *commands;
+  commandInfo.commandBuffer = commands;
   auto signal = begin<VkSemaphoreSubmitInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO);
   signal.semaphore = semaphore_;
   signal.value = submitted_ + 1;
@@ -123,8 +114,27 @@ Result<void> Uploads::submit(FrameObjects& objects) {
   submitInfo.pSignalSemaphoreInfos = &signal;
   const VkResult result = device_.api.vkQueueSubmit2(device_.host.uploadQueue, 1, &submitInfo, VK_NULL_HANDLE);
   if (result != VK_SUCCESS) return vulkanError("vkQueueSubmit2", result);
+  return {};
+}
+
+Result<void> Uploads::submit(FrameObjects& objects) {
+  // Once the copies are queued nothing may fail: the device reads the staging memory.
+  pending_.reserve(pending_.size() + 1);
+  auto info = begin<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
+  info.commandPool = pool_;
+  info.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
+  info.commandBufferCount = 1;
+  VkCommandBuffer commands = VK_NULL_HANDLE;
+  const VkResult result = device_.api.vkAllocateCommandBuffers(device_.host.device, &info, &commands);
+  if (result != VK_SUCCESS) return vulkanError("vkAllocateCommandBuffers", result);
+  auto done = record(commands, objects);
+  if (done) done = queue(commands);
+  if (!done) {
+    device_.api.vkFreeCommandBuffers(device_.host.device, pool_, 1, &commands);
+    return done;
+  }
   objects.frame->uploadValue_ = ++submitted_;
-  pending_.push_back({submitted_, *commands, std::move(objects.staging)});
+  pending_.push_back({submitted_, commands, std::move(objects.staging)});
   return {};
 }
 

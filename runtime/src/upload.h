@@ -28,7 +28,8 @@ class Uploads {
     VkCommandBuffer commands;
     Buffer staging;
   };
-  Result<VkCommandBuffer> record(const FrameObjects& objects);
+  Result<void> record(VkCommandBuffer commands, const FrameObjects& objects) const;
+  Result<void> queue(VkCommandBuffer commands);  // signals submitted_ + 1
 
   Device& device_;
   VkCommandPool pool_ = VK_NULL_HANDLE;

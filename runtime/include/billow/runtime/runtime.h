@@ -7,7 +7,7 @@
 //
 // The host owns instance, device, queues, images, command buffers and the frame loop. billow enables nothing and waits
 // for nothing; it submits uploads to the queue that the host lends, and only inside of upload(). No exception leaves
-// it. A Renderer and its frames are used from one thread at a time.
+// a Renderer's functions. A Renderer and its frames are used from one thread at a time.
 #ifndef BILLOW_RUNTIME_RUNTIME_H
 #define BILLOW_RUNTIME_RUNTIME_H
 
@@ -31,6 +31,7 @@ enum class ErrorCode {
   unsupported,  // the device lacks something that billow needs
   vulkan,       // a Vulkan call failed
   argument,     // an argument is outside of what its comment allows
+  memory,       // the system's memory, not the GPU's, or another of its resources ran out
 };
 
 struct Error {
@@ -51,8 +52,9 @@ struct HostDevice {
   PFN_vkGetInstanceProcAddr getInstanceProcAddr = nullptr;
   VkQueue uploadQueue = VK_NULL_HANDLE;  // transfer, graphics or compute; the host guards it during upload()
   std::uint32_t uploadFamily = 0;
-  std::uint32_t drawFamily = 0;       // of the queues that run recorded commands
-  bool textureCompressionBc = false;  // you checked and enabled it
+  std::uint32_t drawFamily = 0;                    // of the queues that run recorded commands
+  bool textureCompressionBc = false;               // you checked and enabled it
+  VkPipelineCache pipelineCache = VK_NULL_HANDLE;  // optional: pipelines are looked up in it and added to it
 };
 
 // What becomes of BC7 and BC4 bricks. Automatic: they stay blocks where the device reads them exactly and fast, else
@@ -108,7 +110,7 @@ class Frame {
   virtual bool empty() const = 0;
 };
 
-// A pinhole camera in world space. `right`, `up` and `forward` are orthonormal.
+// A pinhole camera in world space, all finite. `right`, `up` and `forward` are orthonormal.
 struct View {
   std::array<double, 3> eye{0, 0, 0};
   std::array<float, 3> right{1, 0, 0};
@@ -130,14 +132,14 @@ struct Sun {
 // How grid values become light. Fields as format::LookRecord has them.
 struct Look {
   float extinctionScale = 1;
-  std::array<float, 3> albedo{0.9f, 0.9f, 0.9f};
-  float anisotropy = 0.5f;        // in (-1, 1)
-  float emissionScale = 1;        // 0: no emission
-  float temperatureScale = 1000;  // kelvin a grid value
-  float temperatureOffset = 300;  // kelvin
-  float referenceKelvin = 1600;   // black body of radiance emissionScale, > 0
-  std::array<float, 3> ambient{0.3f, 0.35f, 0.4f};
-  std::uint32_t scatteringOrders = 1;  // 1: single scattering; more imitate multiple scattering; 1 to 8
+  std::array<float, 3> albedo{0.9f, 0.9f, 0.9f};    // in [0, 1]
+  float anisotropy = 0.5f;                          // in (-1, 1)
+  float emissionScale = 1;                          // 0: no emission
+  float temperatureScale = 1000;                    // kelvin a grid value
+  float temperatureOffset = 300;                    // kelvin
+  float referenceKelvin = 1600;                     // black body of radiance emissionScale, > 0
+  std::array<float, 3> ambient{0.3f, 0.35f, 0.4f};  // finite
+  std::uint32_t scatteringOrders = 1;               // 1: single scattering; more imitate multiple scattering; 1 to 8
   // Smoke derived from temperature (or flames) where there is no extinction grid: shares of heatMax at which smoke
   // begins and is full, and what is left of it at heatMax.
   float heatMax = 1;  // largest temperature (or flames) value, > 0
@@ -146,19 +148,21 @@ struct Look {
   float smokeInFire = 0.25f;
 };
 
+inline constexpr float kLeastStep = 0.05f;  // voxels; shorter ones would keep a device busy for seconds
+
 struct Quality {
   Filter filter = Filter::trilinear;
   Filter shadows = Filter::trilinear;
-  float step = 1;                  // voxels, > 0; never less than a pixel's width
-  float shadowStep = 2;            // voxels, > 0
+  float step = 1;                  // voxels, >= kLeastStep; never less than a pixel's width
+  float shadowStep = 2;            // voxels, >= kLeastStep
   std::uint32_t shadowSteps = 64;  // at most, a sample; longer ways take longer steps
   bool jitter = false;             // displace each pixel's steps by a fixed pattern: noise in place of bands
 };
 
 struct Background {
-  std::array<float, 3> bottom{0, 0, 0};  // linear radiance
+  std::array<float, 3> bottom{0, 0, 0};  // linear radiance, finite
   std::array<float, 3> top{0, 0, 0};
-  float opacity = 0;  // 0: premultiplied result, its alpha is the volume's; 1: the background fills it
+  float opacity = 0;  // in [0, 1]; 0: premultiplied result, its alpha is the volume's; 1: the background fills it
 };
 
 struct DrawInfo {
@@ -178,11 +182,11 @@ struct DrawInfo {
 // Reads of single values, as the march makes them: a tool for tests.
 struct LookupInfo {
   const Frame* frame = nullptr;
-  std::uint32_t slot = 0;  // 0 extinction, 1 temperature, 2 flames
-  Filter filter = Filter::nearest;
-  VkDeviceAddress positions = 0;  // count times three floats, pack index space
-  VkDeviceAddress values = 0;     // count floats are written
-  std::uint32_t count = 0;        // 1 to 4 194 240
+  std::uint32_t slot = 0;           // 0 extinction, 1 temperature, 2 flames
+  Filter filter = Filter::nearest;  // not none
+  VkDeviceAddress positions = 0;    // count times three floats, pack index space
+  VkDeviceAddress values = 0;       // count floats are written
+  std::uint32_t count = 0;          // 1 to 4 194 240
 };
 
 class Renderer {
@@ -197,8 +201,13 @@ class Renderer {
                                                 const UploadOptions& options) = 0;
   virtual VkSemaphore uploadSemaphore() const = 0;
 
-  // Records one dispatch that writes every pixel of both images. A pipeline is built when a combination of grids,
-  // index, filter and colour format is met for the first time.
+  // Builds every pipeline that record() will ask for with frames of this volume, uploaded with these options and drawn
+  // with the filters of `quality` in this colour format. Reads no page; call it while loading, for it may take seconds.
+  virtual Result<void> prepare(const format::Pack& pack, std::uint32_t volume, const UploadOptions& options,
+                               const Quality& quality, ColorFormat colorFormat) = 0;
+
+  // Records one dispatch that writes every pixel of both images. Where a combination of grids, index, filters and
+  // colour format was not prepared, its pipeline is built here when it is first met.
   // barriers: both images must be in VK_IMAGE_LAYOUT_GENERAL and free of pending access; afterwards they were written
   // by the compute shader stage. The submission must wait for the frame's uploadValue().
   virtual Result<void> record(VkCommandBuffer commands, const DrawInfo& draw) = 0;
