@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "billow/format/psnr.h"
 #include "command.h"
 #include "grid_error.h"
 #include "import_options.h"
@@ -28,10 +29,8 @@ struct Row {
   std::string problem;  // "" where the grid was compared
 };
 
-// 20 log10(range / rmse) in dB; infinite where nothing differs, minus infinite where a constant was not kept.
 double psnrOf(const Row& row) {
-  if (row.error.squaredError == 0) return HUGE_VAL;
-  return 20 * std::log10(row.range / row.error.rmse());
+  return format::psnr(row.range, row.error.squaredError, row.error.sourceVoxels);
 }
 
 bool sound(const Row& row) {

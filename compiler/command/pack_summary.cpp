@@ -1,9 +1,10 @@
 #include "pack_summary.h"
 
-#include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "billow/format/brick.h"
+#include "billow/format/psnr.h"
 
 namespace billow::command {
 namespace {
@@ -14,19 +15,13 @@ constexpr const char* kRoleNames[format::kRoleCount] = {"none",       "extinctio
 constexpr const char* kTypeNames[format::kSourceTypeCount] = {"float", "half", "double", "int32", "int64",
                                                               "bool",  "mask", "vec3f",  "vec3d", "vec3i"};
 
-// 20 log10(range / rmse), with the source's range, background included.
-std::optional<double> psnrOf(const format::GridFrame& frame) {
-  if (!(frame.squaredError > 0) || frame.activeVoxels == 0) return std::nullopt;
-  const double range = static_cast<double>(frame.sourceMax) - static_cast<double>(frame.sourceMin);
-  return 20 * std::log10(range / std::sqrt(frame.squaredError / static_cast<double>(frame.activeVoxels)));
-}
-
 GridFrameSummary summariseFrame(const format::GridFrame& frame, std::int32_t number) {
   GridFrameSummary summary;
   summary.frame = number;
   summary.present = (frame.flags & format::kGridPresent) != 0;
   summary.activeVoxels = frame.activeVoxels;
-  summary.psnr = psnrOf(frame);
+  const double psnr = format::psnr(frame);
+  if (psnr < std::numeric_limits<double>::infinity()) summary.psnr = psnr;
   summary.maxError = static_cast<double>(frame.maxError);
   summary.sourceMin = static_cast<double>(frame.sourceMin);
   summary.sourceMax = static_cast<double>(frame.sourceMax);

@@ -6,7 +6,6 @@
 #include <tbb/parallel_pipeline.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <limits>
 #include <memory>
@@ -14,6 +13,7 @@
 #include <optional>
 
 #include "billow/format/gpu_size.h"
+#include "billow/format/psnr.h"
 #include "share/share.h"
 
 namespace billow::compiler {
@@ -33,12 +33,6 @@ struct EncodedFrame {
   ImportedFrame imported;
   std::vector<ChosenGrid> chosen;
 };
-
-double psnrOf(const format::GridFrame& frame) {
-  if (!(frame.squaredError > 0)) return std::numeric_limits<double>::infinity();
-  const double range = static_cast<double>(frame.sourceMax) - static_cast<double>(frame.sourceMin);
-  return 20 * std::log10(range / std::sqrt(frame.squaredError / static_cast<double>(frame.activeVoxels)));
-}
 
 std::string settingsJson(const CompileOptions& options) {
   nlohmann::ordered_json info;
@@ -184,7 +178,7 @@ class Compiler {
     ++report.frames;
     report.activeVoxels += record.activeVoxels;
     for (const ChosenBrick& brick : chosen.bricks) ++report.bricks[brick.encoding];
-    report.worstPsnr = std::min(report.worstPsnr, psnrOf(record));
+    report.worstPsnr = std::min(report.worstPsnr, format::psnr(record));
     report.maxError = std::max(report.maxError, record.maxError);
     report.largestFrameGpuBytes = std::max(report.largestFrameGpuBytes, format::gpuBytes(record).total());
   }
