@@ -21,7 +21,7 @@ struct DeviceOptions {
   bool validation = false;                   // VK_LAYER_KHRONOS_validation; fails where it is not installed
 };
 
-// Two images that a picture is drawn into, and what was read back.
+// A picture that was drawn and read back.
 struct Picture {
   std::uint32_t width = 0, height = 0;
   std::vector<float> rgba;   // premultiplied linear, four a pixel, top row first
