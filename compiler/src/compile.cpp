@@ -4,13 +4,17 @@
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/parallel_pipeline.h>
+#include <xxhash.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <type_traits>
+#include <unordered_map>
 
 #include "billow/format/gpu_size.h"
 #include "billow/format/psnr.h"
@@ -31,8 +35,26 @@ struct Job {
 struct EncodedFrame {
   Job job;
   ImportedFrame imported;
+  std::vector<std::uint64_t> contents;  // contentOf() each grid
   std::vector<ChosenGrid> chosen;
 };
+
+// What a grid in a frame became, for frames that hold the same again.
+struct Written {
+  format::GridFrame record;
+  std::array<std::uint64_t, format::kEncodingCount> bricks{};
+};
+
+// Hash of all that the tree of a grid depends on: voxels, tiles and background, not the transform.
+std::uint64_t contentOf(const ImportedGrid& grid) {
+  std::uint64_t hash = XXH3_64bits_withSeed(&grid.background, sizeof(grid.background), grid.leaves.size());
+  for (const Leaf& leaf : grid.leaves) hash = XXH3_64bits_withSeed(&leaf, sizeof(leaf), hash);
+  for (const Tile& tile : grid.tiles) hash = XXH3_64bits_withSeed(&tile, sizeof(tile), hash);
+  return hash;
+}
+static_assert(std::has_unique_object_representations_v<decltype(Leaf::origin)> && sizeof(Leaf) == 12 + 64 + 2048,
+              "Leaf has no padding that a hash would meet");
+static_assert(sizeof(Tile) == 20, "Tile has no padding that a hash would meet");
 
 std::string settingsJson(const CompileOptions& options) {
   nlohmann::ordered_json info;
@@ -134,9 +156,24 @@ class Compiler {
     if (isHeld(job)) return frame;
     const PlannedVolume& volume = plan_.volumes[job.volume];
     frame->imported = importFrame(volume, volume.frames[job.frame], options_.import, warn_);
+    for (const ImportedGrid& grid : frame->imported.grids) frame->contents.push_back(contentOf(grid));
+    if (allKnown(*frame)) {
+      frame->chosen.resize(volume.grids.size());
+      return frame;
+    }
     frame->chosen =
         chooseEncodings(frame->imported.grids, options_.quality, [&](std::size_t grid) { return where(job, grid); });
     return frame;
+  }
+
+  // Whether every grid of the frame was written before. What this saves is time only: write() decides by itself, in
+  // frame order, so the bytes do not depend on when an earlier frame was done. A budget ties a frame's grids together,
+  // so then nothing is taken from another frame.
+  bool allKnown(const EncodedFrame& frame) {
+    if (options_.quality.gpuBudget) return false;
+    const std::lock_guard lock(mutex_);
+    return std::all_of(frame.contents.begin(), frame.contents.end(),
+                       [this](std::uint64_t content) { return written_.contains(content); });
   }
 
   void write(const EncodedFrame& frame) {
@@ -145,7 +182,7 @@ class Compiler {
     for (std::size_t g = 0; g < grids; ++g) {
       tables_.gridFrames.push_back(isHeld(frame.job) ? tables_.gridFrames[tables_.gridFrames.size() - grids]
                                                      : addGridFrame(frame, g));
-      if (!isHeld(frame.job)) tally(tables_.gridFrames.back(), frame.chosen[g], report_.grids[firstReport + g]);
+      if (!isHeld(frame.job)) tally(frame, g, report_.grids[firstReport + g]);
     }
     ++done_;
     if (options_.progress) options_.progress(done_, jobs_.size());
@@ -154,12 +191,26 @@ class Compiler {
   format::GridFrame addGridFrame(const EncodedFrame& frame, std::size_t g) {
     const ImportedGrid& imported = frame.imported.grids[g];
     if (!imported.present) return absent();
+    const std::uint64_t content = frame.contents[g];
+    const std::lock_guard lock(mutex_);
+    const auto before = written_.find(content);
+    if (before != written_.end() && !options_.quality.gpuBudget) return again(before->second, imported);
     std::vector<std::uint32_t> pages;
     format::GridFrame record = sharer_.addGrid(imported, frame.chosen[g], where(frame.job, g), pages);
     record.flags = format::kGridPresent;
     record.pageListBegin = static_cast<std::uint32_t>(tables_.pageLists.size());
     record.pageListCount = static_cast<std::uint32_t>(pages.size());
     tables_.pageLists.insert(tables_.pageLists.end(), pages.begin(), pages.end());
+    Written& entry = written_[content];
+    entry.record = record;
+    for (const ChosenBrick& brick : frame.chosen[g].bricks) ++entry.bricks[brick.encoding];
+    return record;
+  }
+
+  // The same tree and pages under this frame's transform.
+  static format::GridFrame again(const Written& before, const ImportedGrid& imported) {
+    format::GridFrame record = before.record;
+    placeOrigin(imported.indexToWorld, record);
     return record;
   }
 
@@ -173,11 +224,13 @@ class Compiler {
     return record;
   }
 
-  static void tally(const format::GridFrame& record, const ChosenGrid& chosen, GridReport& report) {
+  void tally(const EncodedFrame& frame, std::size_t g, GridReport& report) const {
+    const format::GridFrame& record = tables_.gridFrames.back();
     if ((record.flags & format::kGridPresent) == 0) return;
     ++report.frames;
     report.activeVoxels += record.activeVoxels;
-    for (const ChosenBrick& brick : chosen.bricks) ++report.bricks[brick.encoding];
+    const auto& bricks = written_.at(frame.contents[g]).bricks;
+    for (std::size_t e = 0; e < bricks.size(); ++e) report.bricks[e] += bricks[e];
     report.worstPsnr = std::min(report.worstPsnr, format::psnr(record));
     report.maxError = std::max(report.maxError, record.maxError);
     report.largestFrameGpuBytes = std::max(report.largestFrameGpuBytes, format::gpuBytes(record).total());
@@ -191,6 +244,8 @@ class Compiler {
   format::PackTables tables_;
   std::vector<Job> jobs_;
   std::uint32_t gridFrames_ = 0;
+  std::mutex mutex_;
+  std::unordered_map<std::uint64_t, Written> written_;  // by content; some 300 bytes a grid and frame
   std::size_t done_ = 0;
   CompileReport report_;
 };

@@ -77,4 +77,13 @@ std::array<std::int32_t, 3> chooseOrigin(const std::array<std::int64_t, 3>& min,
   return origin;
 }
 
+// Pack index p is source index p + origin: the translation moves into the matrix.
+void placeOrigin(const std::array<double, 12>& sourceToWorld, format::GridFrame& record) {
+  std::copy(sourceToWorld.begin(), sourceToWorld.end(), record.indexToWorld);
+  for (std::size_t row = 0; row < 3; ++row) {
+    double* m = record.indexToWorld + 4 * row;
+    m[3] += m[0] * record.origin[0] + m[1] * record.origin[1] + m[2] * record.origin[2];
+  }
+}
+
 }  // namespace billow::compiler

@@ -84,11 +84,7 @@ class TreeBuilder {
       frame_.activeMin[a] = static_cast<std::int32_t>(min[a] - origin[a]);
       frame_.activeMax[a] = static_cast<std::int32_t>(max[a] - origin[a]);
     }
-    // Pack index p is source index p + origin: the translation moves into the matrix.
-    for (std::size_t row = 0; row < 3; ++row) {
-      double* m = frame_.indexToWorld + 4 * row;
-      m[3] += m[0] * origin[0] + m[1] * origin[1] + m[2] * origin[2];
-    }
+    placeOrigin(grid_.indexToWorld, frame_);
   }
 
   std::array<std::uint32_t, 3> packed(const std::array<std::int32_t, 3>& at) const {

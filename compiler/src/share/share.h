@@ -23,6 +23,9 @@ std::array<std::int32_t, 3> chooseOrigin(const std::array<std::int64_t, 3>& min,
 // Inclusive box of active voxels and tiles in source index space; min > max where nothing is active.
 void activeBox(const ImportedGrid& grid, std::array<std::int64_t, 3>& min, std::array<std::int64_t, 3>& max);
 
+// The record's transform: from pack index space, whose zero is source index record.origin, to the world.
+void placeOrigin(const std::array<double, 12>& sourceToWorld, format::GridFrame& record);
+
 // Appends what is new to the writer and remembers what was written by its content (XXH3-128). Not thread-safe:
 // called frame by frame in order, so the pack's bytes do not depend on timing.
 class Sharer {
