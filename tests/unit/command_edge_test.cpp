@@ -5,9 +5,9 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <vector>
 
 #include "unit/run_command.h"
 
@@ -15,18 +15,20 @@ namespace billow::tests {
 namespace {
 
 struct EdgeCase {
-  std::string input;                   // under edge/
-  int code = 0;                        // of compile
-  std::vector<std::string> says = {};  // each must be in what it prints on stderr
-  std::string options = {};            // of compile and of compare
-  double psnr = 45;                    // that compare must find at least, or an exact copy
+  const char* input;         // under edge/
+  int code = 0;              // of compile
+  const char* says[6] = {};  // each must be in what it prints on stderr; none: it prints nothing
+  const char* options = "";  // of compile and of compare
 };
+
+constexpr double kPsnr = 45;  // that compare must find at least, or an exact copy
 
 void PrintTo(const EdgeCase& edge, std::ostream* out) {
   *out << edge.input << " " << edge.options;
 }
 
-const std::vector<EdgeCase> kCases = {
+// Plain constants: a table of strings takes a sanitizer's compiler ten minutes.
+constexpr EdgeCase kCases[] = {
     // Sound files of every kind, without a word of warning.
     {"active_zeros.vdb"},  // active zeros are kept as active: topology is the artist's
     {"alias_names.vdb"},
@@ -126,7 +128,7 @@ void expectFaithful(const std::string& pack, const std::string& input, const Edg
   for (const auto& grid : report.at("grids")) {
     EXPECT_EQ(grid.at("mismatchedVoxels"), 0) << grid;
     const bool exact = grid.at("exact");
-    EXPECT_TRUE(exact || (grid.at("psnr").is_number() && grid.at("psnr") >= edge.psnr)) << grid;
+    EXPECT_TRUE(exact || (grid.at("psnr").is_number() && grid.at("psnr") >= kPsnr)) << grid;
   }
 }
 
@@ -142,10 +144,11 @@ TEST_P(Edge, GivesWhatTheTableSays) {
   const CommandResult compiled = billow(line, "ulimit -t 60; ");
   const std::string context = "billow " + line + "\nexit code " + std::to_string(compiled.code) + "\n" + compiled.err;
   ASSERT_EQ(compiled.code, edge.code) << context;
-  for (const std::string& text : edge.says) {
+  for (const char* text : edge.says) {
+    if (text == nullptr) break;
     EXPECT_NE(compiled.err.find(text), std::string::npos) << "expected: " << text << "\n" << context;
   }
-  if (edge.says.empty()) {
+  if (edge.says[0] == nullptr) {
     EXPECT_EQ(compiled.err, "") << context;
   }
   if (edge.code != 0) {
@@ -168,8 +171,9 @@ TEST(EdgeTable, IsComplete) {
   }
   for (const auto& entry : std::filesystem::directory_iterator(dataFolder())) {
     const std::string name = entry.path().filename().string();
-    EXPECT_TRUE(std::any_of(kCases.begin(), kCases.end(), [&](const EdgeCase& edge) { return edge.input == name; }))
-        << name;
+    EXPECT_TRUE(std::any_of(std::begin(kCases), std::end(kCases), [&](const EdgeCase& edge) {
+      return edge.input == name;
+    })) << name;
   }
 }
 
