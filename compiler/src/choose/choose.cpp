@@ -1,8 +1,6 @@
 #include "choose/choose.h"
 
 #include <fmt/format.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <bit>
@@ -13,6 +11,7 @@
 #include <utility>
 
 #include "billow/format/gpu_size.h"
+#include "parallel.h"
 #include "share/share.h"
 
 namespace billow::compiler {
@@ -286,9 +285,9 @@ class GridChooser {
   }
   template <class Function>
   void forEachBrick(const Function& function) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bricks_.size(), 16), [&](const auto& range) {
+    parallelRanges(bricks_.size(), 16, [&](std::size_t begin, std::size_t end) {
       const auto candidate = std::make_unique<Candidate>();
-      for (std::size_t i = range.begin(); i != range.end(); ++i) function(i, *candidate);
+      for (std::size_t i = begin; i != end; ++i) function(i, *candidate);
     });
   }
 

@@ -5,12 +5,13 @@
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetUtil.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cfloat>
 #include <cmath>
 #include <mutex>
+
+#include "parallel.h"
 
 namespace billow::compiler {
 namespace {
@@ -109,8 +110,10 @@ class TreeSource {
     if (total.tooLarge != 0) return warnTooLarge("the background", componentOf(background_, component));
     out.leaves.resize(leaves_.size());
     std::vector<Notes> notes(leaves_.size());
-    tbb::parallel_for(std::size_t{0}, leaves_.size(), [&](std::size_t i) {
-      convertLeaf(*leaves_[i], component, out.background, out.leaves[i], notes[i]);
+    parallelRanges(leaves_.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i != end; ++i) {
+        convertLeaf(*leaves_[i], component, out.background, out.leaves[i], notes[i]);
+      }
     });
     total.min = total.max = out.background;
     for (std::size_t i = 0; i < leaves_.size(); ++i) merge(notes[i], total);
