@@ -1,16 +1,20 @@
-// GPU bytes against NanoVDB: for every grid of every frame, all of billow's GPU bytes (index, nodes, masks, bricks) at
-// the PSNR asked, beside the smallest NanoVDB grid (Fp4, Fp8, FpN at its coarsest sufficient tolerance) of at least
-// that PSNR. Usage: billow_size_bench [--psnr DB] FILE.vdb...   (each file is compiled alone)
+// Bytes against NanoVDB. On the GPU: for every grid of every frame, all of billow's GPU bytes (index, nodes, masks,
+// bricks) at the PSNR asked, beside the smallest NanoVDB grid (Fp4, Fp8, FpN at its coarsest sufficient tolerance) of
+// at least that PSNR. On disk: for every folder, the pack of all its files beside those NanoVDB grids, the ones of a
+// file together, compressed by zstd -19. Usage: billow_size_bench [--psnr DB] FILE.vdb...   (for the GPU's bytes each
+// file is compiled alone)
 #include <fmt/format.h>
 #include <nanovdb/util/OpenToNanoVDB.h>
 #include <openvdb/openvdb.h>
 #include <unistd.h>
+#include <zstd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -25,6 +29,7 @@ namespace format = billow::format;
 struct Peer {
   std::uint64_t bytes = 0;  // 0: not reached
   std::string name;
+  std::vector<char> grid;
 };
 
 double psnrOf(double squaredError, double range, double voxels) {
@@ -58,7 +63,9 @@ bool tryPeer(const openvdb::FloatGrid& source, float tolerance, double psnr, con
   convert.oracle() = nanovdb::AbsDiff(tolerance);
   auto handle = convert(source, nanovdb::StatsMode::Disable, nanovdb::ChecksumMode::Disable, 0);
   if (gridPsnr<Build>(source, *handle.template grid<Build>()) < psnr) return false;
-  if (best.bytes == 0 || handle.size() < best.bytes) best = Peer{static_cast<std::uint64_t>(handle.size()), name};
+  if (best.bytes != 0 && handle.size() >= best.bytes) return true;
+  const char* data = reinterpret_cast<const char*>(handle.data());
+  best = Peer{static_cast<std::uint64_t>(handle.size()), name, std::vector<char>(data, data + handle.size())};
   return true;
 }
 
@@ -99,21 +106,36 @@ openvdb::FloatGrid::Ptr findGrid(const openvdb::GridPtrVec& grids, const std::st
   return nullptr;
 }
 
+struct Sequence {
+  std::vector<std::string> files;
+  std::uint64_t peerDisk = 0;  // bytes
+};
+
 struct Totals {
   double logRatio = 0;
   double worst = 0;
   int rows = 0;
+  std::map<std::string, Sequence> sequences;  // by folder
 };
 
-void benchFile(const std::string& path, double psnr, Totals& totals) {
-  const std::string output =
-      (std::filesystem::temp_directory_path() / fmt::format("size_bench_{}.blw", getpid())).string();
+std::string compileTo(const std::vector<std::string>& inputs, double psnr) {
+  std::string output = (std::filesystem::temp_directory_path() / fmt::format("size_bench_{}.blw", getpid())).string();
   billow::compiler::CompileOptions options;
   options.quality.psnr = psnr;
-  const auto quiet = [](const std::string&) {};
-  billow::compiler::compile({path}, output, options, quiet);
+  billow::compiler::compile(inputs, output, options, [](const std::string&) {});
+  return output;
+}
+
+std::uint64_t zstd19(const std::vector<char>& bytes) {
+  std::vector<char> out(ZSTD_compressBound(bytes.size()));
+  return ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), 19);
+}
+
+void benchFile(const std::string& path, double psnr, Totals& totals) {
+  const std::string output = compileTo({path}, psnr);
   const auto pack = format::Pack::openFile(output);
   std::filesystem::remove(output);
+  std::vector<char> peerFile;
   openvdb::io::File file(path);
   file.open(false);
   const auto grids = file.getGrids();
@@ -135,10 +157,24 @@ void benchFile(const std::string& path, double psnr, Totals& totals) {
                psnrOf(frame.squaredError, range, voxels), bytes.total(), total * 8 / voxels, peer.bytes, peer.name,
                static_cast<double>(peer.bytes) * 8 / voxels, ratio);
     if (ratio == 0) continue;
+    peerFile.insert(peerFile.end(), peer.grid.begin(), peer.grid.end());
     totals.logRatio += std::log(ratio);
     totals.worst = std::max(totals.worst, ratio);
     ++totals.rows;
   }
+  Sequence& sequence = totals.sequences[std::filesystem::path(path).parent_path().string()];
+  sequence.files.push_back(path);
+  sequence.peerDisk += zstd19(peerFile);
+}
+
+void benchDisk(const std::string& folder, const Sequence& sequence, double psnr) {
+  if (sequence.peerDisk == 0) return;
+  const std::string output = compileTo(sequence.files, psnr);
+  const std::uint64_t bytes = std::filesystem::file_size(output);
+  std::filesystem::remove(output);
+  fmt::print("disk: {:<16} {:>3} files: billow {:>9}, NanoVDB by zstd -19 {:>9}, ratio {:.3f}\n",
+             std::filesystem::path(folder).filename().string(), sequence.files.size(), bytes, sequence.peerDisk,
+             static_cast<double>(bytes) / static_cast<double>(sequence.peerDisk));
 }
 
 }  // namespace
@@ -161,6 +197,7 @@ int main(int argc, char** argv) {
       fmt::print("{}: {}\n", file, error.what());
     }
   }
+  for (const auto& [folder, sequence] : totals.sequences) benchDisk(folder, sequence, psnr);
   if (totals.rows > 0) {
     fmt::print("{} grid frames: geometric mean of ratios {:.3f}, worst {:.3f}\n", totals.rows,
                std::exp(totals.logRatio / totals.rows), totals.worst);
