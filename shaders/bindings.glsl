@@ -10,6 +10,7 @@ layout(constant_id = 1) const uint kFilter = 1;     // kFilterTrilinear
 layout(constant_id = 2) const uint kShadow = 1;     // kFilterTrilinear, kFilterNearest or kFilterNone
 layout(constant_id = 3) const uint kGrids = 1;      // bit of each slot in use
 
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer QuadArray { uvec4 items[]; };
 layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer PairArray { uvec2 items[]; };
 layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer WordArray { uint items[]; };
 

@@ -1,4 +1,4 @@
-// A record (Node3) and the value of one of its voxels, to the bit as format::reconstruct gives it.
+// A record (GpuRecord) and the value of one of its voxels, to the bit as format::reconstruct gives it.
 #ifndef BILLOW_BRICK
 #define BILLOW_BRICK
 
@@ -9,16 +9,11 @@ struct Record {
   uint mask;   // GPU mask number, kMaskAll or kMaskTexel
   float lo;
   float scale;
-  float tile;
 };
 
 Record loadRecord(uint g, uint number) {
-  PairArray records = PairArray(params.grids[g].tableAndRecords.zw);
-  const uint at = (number - 1u) * 3u;
-  const uvec2 head = records.items[at];
-  const uvec2 range = records.items[at + 1u];
-  const uvec2 rest = records.items[at + 2u];
-  return Record(head.x, head.y, uintBitsToFloat(range.x), uintBitsToFloat(range.y), uintBitsToFloat(rest.x));
+  const uvec4 words = QuadArray(params.grids[g].tableAndRecords.zw).items[number - 1u];
+  return Record(words.x, words.y, uintBitsToFloat(words.z), uintBitsToFloat(words.w));
 }
 
 ivec3 slotCorner(uint slot, uint layoutBits, ivec3 slotTexels) {
@@ -74,7 +69,7 @@ bool isActive(uint g, uint mask, uint texel, ivec3 v) {
 
 float recordVoxel(uint g, Record record, ivec3 v) {
   const uint texel = fetchTexel(record.brick, v);
-  if (!isActive(g, record.mask, texel, v)) return record.tile;
+  if (!isActive(g, record.mask, texel, v)) return params.grids[g].boxMin.w;
   precise const float product = record.scale * float(texel);
   precise const float value = record.lo + product;
   return value;

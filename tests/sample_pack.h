@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "billow/format/brick.h"
+#include "billow/format/gpu_size.h"
 #include "billow/format/writer.h"
 
 namespace billow::tests {
@@ -49,11 +50,10 @@ class GridFrameBuilder {
     format::Node3 node{};
     node.lo = lo;
     node.scale = scale;
-    node.tile = frame_.background;
     node.brick = encoding << format::kEncodingShift;
     if (!bytes.empty()) {
-      node.brick |= add(format::Stream::unit, bytes.data(), static_cast<std::uint32_t>(bytes.size() / 128));
-      ++frame_.brickCount[std::countr_zero(bytes.size()) - 7];
+      node.brick |= add(format::Stream::unit, bytes.data(), format::brickUnits(encoding));
+      format::countBrick(frame_, encoding);
     }
     node.mask = maskWord;
     if (maskWord == 0) {
@@ -62,7 +62,7 @@ class GridFrameBuilder {
     }
     format::Values values;
     format::Mask3 active;
-    format::decodeBrick(node, &mask, bytes, values, active);
+    format::decodeBrick(node, &mask, bytes, frame_.background, values, active);
     place(cell, finish(node, values), active);
   }
 
@@ -73,6 +73,9 @@ class GridFrameBuilder {
     node.tile = node.min = node.max = node.mean = value;
     const std::uint32_t index = add(format::Stream::node4, &node, 1);
     ++frame_.node4Count;
+    const auto bits = std::bit_cast<std::uint32_t>(value);
+    if (bits != std::bit_cast<std::uint32_t>(frame_.background)) tileBits_.insert(bits);
+    frame_.tileCount = static_cast<std::uint32_t>(tileBits_.size());
     frame_.activeVoxels += 128 * 128 * 128;
     for (int axis = 0; axis < 3; ++axis) {
       const auto low = static_cast<std::int32_t>(at[static_cast<std::size_t>(axis)] * 128);
@@ -161,6 +164,7 @@ class GridFrameBuilder {
   format::GridFrame frame_{};
   std::map<std::uint32_t, std::map<std::uint32_t, Child>> nodes_;
   std::map<std::uint32_t, Child> tiles_;
+  std::set<std::uint32_t> tileBits_;
   std::set<std::uint32_t> pages_;
 };
 

@@ -21,9 +21,9 @@ Json toJson(const format::GpuBytes& gpu) {
   Json json;
   json["indexKind"] = gpu.index == format::GpuIndex::flat ? "flat" : "tree";
   json["index"] = gpu.indexBytes;
-  json["node3"] = gpu.node3Bytes;
+  json["records"] = gpu.recordBytes;
   json["masks"] = gpu.maskBytes;
-  for (std::uint32_t i = 0; i < format::kBrickClassCount; ++i) json[kClassNames[i]] = gpu.brickBytes[i];
+  for (std::uint32_t i = 0; i < format::kBrickClassCount; ++i) json[kClassNames[i]] = gpu.classBytes[i];
   json["total"] = gpu.total();
   return json;
 }
@@ -135,10 +135,11 @@ void printLargestFrame(const VolumeSummary& volume) {
     format::GpuBytes sum;
     for (const GridSummary& grid : volume.grids) {
       sum.indexBytes += grid.frames[f].gpu.indexBytes;
-      sum.node3Bytes += grid.frames[f].gpu.node3Bytes;
+      sum.recordBytes += grid.frames[f].gpu.recordBytes;
       sum.maskBytes += grid.frames[f].gpu.maskBytes;
+      sum.brickBytes += grid.frames[f].gpu.brickBytes;
       for (std::uint32_t i = 0; i < format::kBrickClassCount; ++i)
-        sum.brickBytes[i] += grid.frames[f].gpu.brickBytes[i];
+        sum.classBytes[i] += grid.frames[f].gpu.classBytes[i];
     }
     if (sum.total() < largest.total()) continue;
     largest = sum;
@@ -146,9 +147,9 @@ void printLargestFrame(const VolumeSummary& volume) {
   }
   if (largest.total() == 0) return;
   std::string kinds = fmt::format("index {}, brick headers {}, masks {}", size(largest.indexBytes),
-                                  size(largest.node3Bytes), size(largest.maskBytes));
+                                  size(largest.recordBytes), size(largest.maskBytes));
   for (std::uint32_t i = 0; i < format::kBrickClassCount; ++i) {
-    if (largest.brickBytes[i] > 0) kinds += fmt::format(", {} {}", kClassNames[i], size(largest.brickBytes[i]));
+    if (largest.classBytes[i] > 0) kinds += fmt::format(", {} {}", kClassNames[i], size(largest.classBytes[i]));
   }
   fmt::print("\n  Largest frame on the GPU: {}, {} ({})\n", number, size(largest.total()), kinds);
 }

@@ -38,7 +38,7 @@ compiler::ImportedGrid reconstruct(const format::GridView& view) {
     }
     compiler::Leaf& target = grid.leaves.emplace_back();
     target.origin = origin;
-    format::decodeBrick(leaf.node, leaf.mask, leaf.brick, target.values, target.active);
+    format::decodeBrick(leaf.node, leaf.mask, leaf.brick, frame.background, target.values, target.active);
   }
   for (const format::GridView::Tile& tile : view.tiles()) {
     grid.tiles.push_back({toSource(tile.origin, frame), tile.dim, tile.value});

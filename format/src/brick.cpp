@@ -81,8 +81,8 @@ float reconstruct(float lo, float scale, std::uint32_t texel) {
   return lo + product;
 }
 
-void decodeBrick(const Node3& node, const Mask3* mask, std::span<const std::byte> brick, Values& values,
-                 Mask3& active) {
+void decodeBrick(const Node3& node, const Mask3* mask, std::span<const std::byte> brick, float background,
+                 Values& values, Mask3& active) {
   Texels texels;
   decodeTexels(encodingOf(node), brick, texels);
   if (node.mask == kMaskTexel) {
@@ -93,7 +93,7 @@ void decodeBrick(const Node3& node, const Mask3* mask, std::span<const std::byte
     active = *mask;
   }
   for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
-    values[i] = maskBit(active, i) ? reconstruct(node.lo, node.scale, texels[i]) : node.tile;
+    values[i] = maskBit(active, i) ? reconstruct(node.lo, node.scale, texels[i]) : background;
   }
 }
 

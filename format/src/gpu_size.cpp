@@ -13,9 +13,7 @@ constexpr std::uint64_t kNode4IndexBytes = sizeof(Node4) + 128 * sizeof(std::uin
 }  // namespace
 
 std::uint64_t GpuBytes::total() const {
-  std::uint64_t sum = indexBytes + node3Bytes + maskBytes;
-  for (const std::uint64_t bytes : brickBytes) sum += bytes;
-  return sum;
+  return indexBytes + recordBytes + maskBytes + brickBytes;
 }
 
 CellBox cellBox(const GridFrame& gridFrame) {
@@ -31,13 +29,11 @@ CellBox cellBox(const GridFrame& gridFrame) {
 GpuBytes gpuBytes(const GridFrame& gridFrame) {
   GpuBytes bytes;
   if (gridFrame.node5 == kNone) return bytes;
-  bytes.node3Bytes = std::uint64_t{gridFrame.node3Count} * sizeof(Node3);
+  bytes.recordBytes = (std::uint64_t{gridFrame.node3Count} + gridFrame.tileCount) * kGpuRecordBytes;
   bytes.maskBytes = std::uint64_t{gridFrame.maskCount} * sizeof(Mask3);
-  std::uint64_t payload = bytes.node3Bytes;
-  for (std::uint32_t i = 0; i < kBrickClassCount; ++i) {
-    bytes.brickBytes[i] = gridFrame.brickCount[i] * kClassBytes[i];
-    payload += bytes.brickBytes[i];
-  }
+  bytes.brickBytes = std::uint64_t{gridFrame.brickUnits} * kBrickUnitBytes;
+  for (std::uint32_t i = 0; i < kBrickClassCount; ++i) bytes.classBytes[i] = gridFrame.brickCount[i] * kClassBytes[i];
+  const std::uint64_t payload = bytes.recordBytes + bytes.brickBytes;
   const std::uint64_t flat = cellBox(gridFrame).count() * sizeof(std::uint32_t);
   const std::uint64_t tree = kNode5IndexBytes + gridFrame.node4Count * kNode4IndexBytes +
                              std::uint64_t{gridFrame.childCount} * sizeof(std::uint32_t);
@@ -45,6 +41,12 @@ GpuBytes gpuBytes(const GridFrame& gridFrame) {
   bytes.index = flat <= tree + payload / 4 ? GpuIndex::flat : GpuIndex::tree;
   bytes.indexBytes = bytes.index == GpuIndex::flat ? flat : tree;
   return bytes;
+}
+
+void countBrick(GridFrame& gridFrame, std::uint32_t encoding) {
+  if (encoding == kEncodingConstant) return;
+  gridFrame.brickUnits += brickUnits(encoding);
+  ++gridFrame.brickCount[static_cast<std::uint32_t>(brickClass(encoding))];
 }
 
 }  // namespace billow::format

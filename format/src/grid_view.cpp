@@ -59,12 +59,12 @@ std::uint32_t texelAt(std::uint32_t encoding, std::span<const std::byte> brick, 
   return byteAt(brick, index) | (encoding == kEncodingR16 ? byteAt(brick, kBrickVoxels + index) << 8 : 0u);
 }
 
-float valueIn(const GridView::Leaf& leaf, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+float valueIn(const GridView::Leaf& leaf, float background, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
   const Node3& node = leaf.node;
-  if (leaf.mask != nullptr && !maskBit(*leaf.mask, voxelIndex(x, y, z))) return node.tile;
+  if (leaf.mask != nullptr && !maskBit(*leaf.mask, voxelIndex(x, y, z))) return background;
   std::uint32_t at[3] = {x, y, z};
   const std::uint32_t texel = texelAt(encodingOf(node), leaf.brick, at);
-  if (node.mask == kMaskTexel && texel == 0) return node.tile;
+  if (node.mask == kMaskTexel && texel == 0) return background;
   return reconstruct(node.lo, node.scale, texel);
 }
 
@@ -234,7 +234,7 @@ float GridView::voxel(std::int64_t x, std::int64_t y, std::int64_t z) const {
     tile = findRegion(tiles(), order);
     if (tile != nullptr && tile->dim < kIndexSpan && treeOrder(tile->origin) >> 12 != order >> 12) tile = nullptr;
   }
-  if (leaf != nullptr) return valueIn(*leaf, origin[0] & 7, origin[1] & 7, origin[2] & 7);
+  if (leaf != nullptr) return valueIn(*leaf, frame_.background, origin[0] & 7, origin[1] & 7, origin[2] & 7);
   return tile != nullptr ? tile->value : frame_.background;
 }
 

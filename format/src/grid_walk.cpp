@@ -19,10 +19,6 @@ constexpr std::uint8_t kInsideBrick = 1;
 constexpr std::uint8_t kFirstUnit = 0x80;
 constexpr std::uint32_t kClassShift = 4;
 
-std::uint32_t classOf(std::uint32_t bytes) {
-  return static_cast<std::uint32_t>(std::countr_zero(bytes / 128));
-}
-
 // What an item of another array is.
 constexpr std::uint8_t kReached = 1;
 constexpr std::uint8_t kBroken = 2;
@@ -34,6 +30,11 @@ constexpr std::uint32_t number(Stream stream) {
 template <class T>
 const T* as(const std::byte* data) {
   return reinterpret_cast<const T*>(data);
+}
+
+// H of the standard: what the largest texel stands for.
+float largestValue(const Node3& node) {
+  return reconstruct(node.lo, node.scale, encodingOf(node) == kEncodingR16 ? 65535 : 255);
 }
 
 std::array<std::uint16_t, 3> childOrigin(std::uint32_t bit, std::uint32_t log2, std::uint32_t childSpanLog2) {
@@ -157,6 +158,7 @@ void GridWalk::visitNode5(const Node5& node) {
   if (children == 0 && (node.flags & kNodeTileActive) != 0) {
     active_ = std::uint64_t{1} << 3 * kNode5SpanLog2;
     box_ = {{0, 0, 0}, {kNode5Last, kNode5Last, kNode5Last}};
+    countTile(node.tile);
   }
   if (list == nullptr) return;
   forEachBit(node.mask, [&](std::uint32_t bit) {
@@ -191,6 +193,7 @@ void GridWalk::visitNode4(const Node4& node, std::uint32_t index, SubtreeFacts& 
   if (children == 0 && (node.flags & kNodeTileActive) != 0) {
     facts.active = std::uint64_t{1} << 3 * kNode4SpanLog2;
     facts.box = {{0, 0, 0}, {kNode4Last, kNode4Last, kNode4Last}};
+    countTile(node.tile);
   }
   if (list == nullptr) return;
   forEachBit(node.mask, [&](std::uint32_t bit) {
@@ -228,11 +231,11 @@ void GridWalk::visitChild3(const Node4& parent, std::uint32_t parentIndex, std::
 bool GridWalk::findParts(const Node3& node, const Mask3*& mask, std::span<const std::byte>& brick) {
   mask = nullptr;
   brick = {};
-  const std::uint32_t bytes = brickBytes(encodingOf(node)).value_or(0);
-  if (bytes > 0) {
-    const ItemFinder::Found found = finder_.find(Stream::unit, unitOf(node), bytes / kStreamItemBytes[0]);
+  const std::uint32_t units = brickUnits(encodingOf(node));
+  if (units > 0) {
+    const ItemFinder::Found found = finder_.find(Stream::unit, unitOf(node), units);
     if (found.data == nullptr) return false;
-    brick = {found.data, bytes};
+    brick = {found.data, std::size_t{units} * kBrickUnitBytes};
   }
   if (node.mask == kMaskAll || node.mask == kMaskTexel) return true;
   mask = as<Mask3>(finder_.find(Stream::mask, node.mask, 1).data);
@@ -240,11 +243,11 @@ bool GridWalk::findParts(const Node3& node, const Mask3*& mask, std::span<const 
 }
 
 bool GridWalk::visitNode3(const Node3& node, std::uint32_t index, BrickFacts& facts) {
-  const std::uint32_t bytes = brickBytes(encodingOf(node)).value_or(0);
-  if (bytes > 0) {
-    const ItemFinder::Found found = finder_.find(Stream::unit, unitOf(node), bytes / kStreamItemBytes[0]);
+  const std::uint32_t units = brickUnits(encodingOf(node));
+  if (units > 0) {
+    const ItemFinder::Found found = finder_.find(Stream::unit, unitOf(node), units);
     if (found.data == nullptr) return reportMissing("brick", unitOf(node)), false;
-    if (!countBrick(found.local, encodingOf(node), bytes)) {
+    if (!countUnits(found.local, encodingOf(node), units)) {
       sink_.report(Rule::brickOverlap, itemPlace("Node3", index), "Its units are in part those of another brick.");
     }
   }
@@ -261,30 +264,40 @@ bool GridWalk::visitNode3(const Node3& node, std::uint32_t index, BrickFacts& fa
     measureActive(*as<Mask3>(found.data), facts);
     boundLoosely(node, facts);
   }
-  if (facts.active < kBrickVoxels && node.tile != frame_.background) {
-    sink_.report(Rule::brickTile, itemPlace("Node3", index),
-                 fmt::format("It is {}, the background {}.", node.tile, frame_.background));
-  }
+  checkMean(node, index);
   return true;
 }
 
 // Counts a brick when it is met first; false where it cuts another.
-bool GridWalk::countBrick(std::uint32_t local, std::uint32_t encoding, std::uint32_t bytes) {
-  std::vector<std::uint8_t>& units = reached_[number(Stream::unit)];
-  const std::uint32_t brickClass = classOf(bytes);
-  const auto first = static_cast<std::uint8_t>(kFirstUnit | brickClass << kClassShift);
+bool GridWalk::countUnits(std::uint32_t local, std::uint32_t encoding, std::uint32_t units) {
+  const auto first =
+      static_cast<std::uint8_t>(kFirstUnit | static_cast<std::uint32_t>(brickClass(encoding)) << kClassShift);
   const auto axis = static_cast<std::uint8_t>(1u << packedAxis(encoding));
-  const std::span<std::uint8_t> own = std::span(units).subspan(local, bytes / kStreamItemBytes[0]);
+  const std::span<std::uint8_t> own = std::span(reached_[number(Stream::unit)]).subspan(local, units);
   if ((own[0] & ~7u) == first) {
-    if ((own[0] & axis) == 0) ++brickCount_[brickClass];
+    if ((own[0] & axis) == 0) countBrick(counted_, encoding);
     own[0] = static_cast<std::uint8_t>(own[0] | axis);
     return true;
   }
   if (!std::all_of(own.begin(), own.end(), [](std::uint8_t unit) { return unit == 0; })) return false;
   std::fill(own.begin(), own.end(), kInsideBrick);
   own[0] = static_cast<std::uint8_t>(first | axis);
-  ++brickCount_[brickClass];
+  countBrick(counted_, encoding);
   return true;
+}
+
+void GridWalk::checkMean(const Node3& node, std::uint32_t index) {
+  const float background = frame_.background;
+  const float high = largestValue(node);
+  if (node.mean >= std::min(node.lo, background) && node.mean <= std::max(high, background)) return;
+  sink_.report(
+      Rule::brickMean, itemPlace("Node3", index),
+      fmt::format("It is {}, the brick holds [{}, {}], the background is {}.", node.mean, node.lo, high, background));
+}
+
+void GridWalk::countTile(float value) {
+  const auto bits = std::bit_cast<std::uint32_t>(value);
+  if (bits != std::bit_cast<std::uint32_t>(frame_.background)) tiles_.insert(bits);
 }
 
 void GridWalk::measureExactly(const Node3& node, BrickFacts& facts) {
@@ -293,7 +306,7 @@ void GridWalk::measureExactly(const Node3& node, BrickFacts& facts) {
   if (!findParts(node, mask, brick)) return;
   Values values;
   Mask3 active;
-  decodeBrick(node, mask, brick, values, active);
+  decodeBrick(node, mask, brick, frame_.background, values, active);
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
   facts.min = *low;
   facts.max = *high;
@@ -302,11 +315,11 @@ void GridWalk::measureExactly(const Node3& node, BrickFacts& facts) {
 }
 
 // Bounds that need no decoding: what the brick can hold at most. Mostly they do.
-void GridWalk::boundLoosely(const Node3& node, BrickFacts& facts) {
-  const float high = reconstruct(node.lo, node.scale, encodingOf(node) == kEncodingR16 ? 65535 : 255);
+void GridWalk::boundLoosely(const Node3& node, BrickFacts& facts) const {
+  const float high = largestValue(node), background = frame_.background;
   const bool none = facts.active == 0, all = facts.active == kBrickVoxels;
-  facts.min = none ? node.tile : all ? node.lo : std::min(node.lo, node.tile);
-  facts.max = none ? node.tile : all ? high : std::max(high, node.tile);
+  facts.min = none ? background : all ? node.lo : std::min(node.lo, background);
+  facts.max = none ? background : all ? high : std::max(high, background);
   facts.exact = none || encodingOf(node) == kEncodingConstant;
 }
 
@@ -342,7 +355,11 @@ void GridWalk::checkTotals() {
   compare("masks", frame_.maskCount, maskCount_);
   compare("child list entries", frame_.childCount, childCount_);
   constexpr std::string_view kClassNames[kBrickClassCount] = {"BC7 bricks", "BC4 bricks", "R8 bricks", "R16 bricks"};
-  for (std::uint32_t i = 0; i < kBrickClassCount; ++i) compare(kClassNames[i], frame_.brickCount[i], brickCount_[i]);
+  for (std::uint32_t i = 0; i < kBrickClassCount; ++i) {
+    compare(kClassNames[i], frame_.brickCount[i], counted_.brickCount[i]);
+  }
+  compare("brick units", frame_.brickUnits, counted_.brickUnits);
+  compare("values of tiles", frame_.tileCount, tiles_.size());
   if (frame_.activeVoxels != active_) {
     sink_.report(Rule::activeVoxels, place_, fmt::format("It says {}, and reaches {}.", frame_.activeVoxels, active_));
   }

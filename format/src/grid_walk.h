@@ -4,10 +4,12 @@
 
 #include <array>
 #include <cstdint>
+#include <set>
 #include <span>
 #include <vector>
 
 #include "billow/format/brick.h"
+#include "billow/format/gpu_size.h"
 #include "rules.h"
 
 namespace billow::format {
@@ -101,9 +103,11 @@ class GridWalk {
                    SubtreeFacts& facts);
   // False where a part of it is missing, which is reported.
   bool visitNode3(const Node3& node, std::uint32_t index, BrickFacts& facts);
-  bool countBrick(std::uint32_t local, std::uint32_t encoding, std::uint32_t bytes);
+  bool countUnits(std::uint32_t local, std::uint32_t encoding, std::uint32_t units);
+  void countTile(float value);
+  void checkMean(const Node3& node, std::uint32_t index);
   void measureExactly(const Node3& node, BrickFacts& facts);
-  static void boundLoosely(const Node3& node, BrickFacts& facts);
+  void boundLoosely(const Node3& node, BrickFacts& facts) const;
   static void measureActive(const Mask3& mask, BrickFacts& facts);
   void checkTotals();
   void checkBox();
@@ -120,7 +124,8 @@ class GridWalk {
   std::vector<BrickFacts> bricks_;
   std::vector<SubtreeFacts> subtrees_;
   std::uint64_t node4Count_ = 0, node3Count_ = 0, maskCount_ = 0, childCount_ = 0, leafCount_ = 0, active_ = 0;
-  std::uint64_t brickCount_[kBrickClassCount] = {};
+  GridFrame counted_{};            // brickUnits and brickCount of what was reached
+  std::set<std::uint32_t> tiles_;  // bits of active tiles' values other than the background
   Box box_;
 };
 

@@ -98,7 +98,7 @@ constexpr IssueKind kCatalogue[] = {
     error(Rule::pageStreams, "page-streams", "The pages' runs divide each global array, in order and without gaps."),
     error(Rule::pageOffset, "page-offset", "The pages follow one another without gaps and fill their section."),
     error(Rule::streamLength, "stream-length",
-          "A global array has at most 2^28 units, 2^31 masks, or 2^32 - 1 other items."),
+          "A global array has at most 2^27 units, 2^31 masks, or 2^32 - 1 other items."),
 
     error(Rule::pageChecksum, "page-checksum", "A page's checksum matches its stored bytes."),
     error(Rule::pageDecompress, "page-decompress", "A page decompresses to exactly its raw size."),
@@ -123,9 +123,9 @@ constexpr IssueKind kCatalogue[] = {
     error(Rule::brickMask, "brick-mask", "A brick's mask exists, and comes from its texels only in R8 and R16."),
     error(Rule::brickFinite, "brick-finite", "A brick's values are finite, the largest that it can hold included."),
     error(Rule::brickScale, "brick-scale", "A brick's scale is not negative, and a constant's is zero."),
-    error(Rule::brickMean, "brick-mean", "A brick's mean lies between the least and the largest that it can hold."),
+    error(Rule::brickMean, "brick-mean",
+          "A brick's mean lies between the least and the largest that it can hold, or the background."),
     error(Rule::brickOverlap, "brick-overlap", "Two bricks have the same units and size, or none in common."),
-    error(Rule::brickTile, "brick-tile", "The tile of a brick with inactive voxels is the background."),
 
     error(Rule::counts, "counts", "A grid frame's counts are those of what it reaches."),
     error(Rule::activeVoxels, "active-voxels", "A grid frame's active voxels are those that it reaches."),

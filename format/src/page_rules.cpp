@@ -134,7 +134,7 @@ class ItemRules {
     const std::uint32_t encoding = encodingOf(node);
     const std::optional<std::uint32_t> bytes = brickBytes(encoding);
     if (!bytes) return sink_.report(Rule::brickEncoding, place_, fmt::format("Encoding {}.", encoding));
-    const std::uint32_t units = *bytes / kStreamItemBytes[0];
+    const std::uint32_t units = *bytes / kBrickUnitBytes;
     if (units == 0 ? unitOf(node) != 0 : !inOnePage(Stream::unit, unitOf(node), units)) {
       sink_.report(Rule::brickUnits, place_, fmt::format("{} units at {}.", units, unitOf(node)));
     }
@@ -149,17 +149,12 @@ class ItemRules {
 
   void checkNode3Values(const Node3& node, std::uint32_t encoding) {
     const float high = reconstruct(node.lo, node.scale, encoding == kEncodingR16 ? 65535 : 255);
-    const auto values = [&] {
-      return fmt::format("lo {}, scale {}, tile {}, mean {}.", node.lo, node.scale, node.tile, node.mean);
-    };
-    if (!finite(node.lo) || !finite(node.scale) || !finite(node.tile) || !finite(node.mean) || !finite(high)) {
+    const auto values = [&] { return fmt::format("lo {}, scale {}, mean {}.", node.lo, node.scale, node.mean); };
+    if (!finite(node.lo) || !finite(node.scale) || !finite(node.mean) || !finite(high)) {
       return sink_.report(Rule::brickFinite, place_, values());
     }
     if (node.scale < 0 || (encoding == kEncodingConstant && node.scale != 0)) {
       sink_.report(Rule::brickScale, place_, values());
-    }
-    if (node.mean < std::min(node.lo, node.tile) || node.mean > std::max(high, node.tile)) {
-      sink_.report(Rule::brickMean, place_, values());
     }
   }
 

@@ -109,7 +109,6 @@ enum class Rule : std::uint16_t {
   brickScale = 505,
   brickMean = 506,
   brickOverlap = 507,
-  brickTile = 508,
 
   counts = 601,
   activeVoxels = 602,

@@ -24,7 +24,7 @@ constexpr std::uint64_t aligned(std::uint64_t offset) {
 // Pages are written before anybody knows whether there will be an INFO section, so room is kept for its entry.
 constexpr std::uint64_t kPagesOffset = aligned(sizeof(FileHeader) + kMostSections * sizeof(SectionEntry));
 
-// Global indices are 32 bits wide, those of units 28 (beside the encoding) and those of masks 31.
+// Global indices are 32 bits wide, those of units 27 (beside the encoding) and those of masks 31.
 constexpr std::uint64_t kStreamLimit[kStreamCount] = {
     std::uint64_t{kBrickUnitMask} + 1, kMaskIndexLimit, kNone, kNone, kNone, kNone};
 

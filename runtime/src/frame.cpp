@@ -66,7 +66,7 @@ void countBytes(const StagedFrame& staged, FrameStats& stats) {
   for (const auto& grid : staged.grids) {
     if (!grid) continue;
     stats.indexBytes += grid->indexBytes();
-    stats.recordBytes += grid->records.size() * sizeof(format::Node3);
+    stats.recordBytes += grid->records.size() * sizeof(GpuRecord);
     stats.maskBytes += grid->masks.size() * sizeof(format::Mask3);
   }
   stats.bc7Bricks = staged.slots.slots(BrickStore::bc7);

@@ -19,10 +19,8 @@ class RecordTable {
   std::uint32_t leaf(const GridView::Leaf& leaf) {
     const auto [entry, fresh] = leaves_.try_emplace(leaf.index, 0);
     if (!fresh) return entry->second;
-    format::Node3 record = leaf.node;
-    record.brick = slots_.place(leaf);
-    if (leaf.mask != nullptr) record.mask = mask(leaf);
-    return entry->second = add(record);
+    const std::uint32_t maskWord = leaf.mask != nullptr ? mask(leaf) : leaf.node.mask;
+    return entry->second = add({slots_.place(leaf), maskWord, leaf.node.lo, leaf.node.scale});
   }
 
   // 0 where the value is the background's.
@@ -30,12 +28,12 @@ class RecordTable {
     const std::uint32_t bits = std::bit_cast<std::uint32_t>(value);
     if (bits == std::bit_cast<std::uint32_t>(grid_.frame.background)) return 0;
     const auto [entry, fresh] = tiles_.try_emplace(bits, 0);
-    if (fresh) entry->second = add({0, format::kMaskAll, value, 0, value, value});
+    if (fresh) entry->second = add({0, format::kMaskAll, value, 0});
     return entry->second;
   }
 
  private:
-  std::uint32_t add(const format::Node3& record) {
+  std::uint32_t add(const GpuRecord& record) {
     grid_.records.push_back(record);
     return static_cast<std::uint32_t>(grid_.records.size());
   }

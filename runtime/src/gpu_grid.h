@@ -47,6 +47,15 @@ class BrickSlots {
   std::unordered_map<std::uint32_t, std::uint32_t> placed_;  // the pack's brick word -> ours
 };
 
+// What the GPU reads of a Node3 or of an active tile, in one load. An inactive voxel's value is the grid's background.
+struct GpuRecord {
+  std::uint32_t brick;  // encoding on the GPU << kEncodingShift | slot
+  std::uint32_t mask;   // number in GpuGrid::masks, kMaskAll or kMaskTexel
+  float lo;
+  float scale;
+};
+static_assert(sizeof(GpuRecord) == format::kGpuRecordBytes);
+
 // One grid as arrays, ready to be copied. Layouts: shaders/interface.h.
 struct GpuGrid {
   format::GridFrame frame{};
@@ -55,7 +64,7 @@ struct GpuGrid {
   std::vector<std::uint32_t> table;     // flat: an entry a cell; tree: Node5 words; dense: Node4 number + 1 a child
   std::vector<std::uint32_t> node4;     // tree: Node4 words; dense: a record a child
   std::vector<std::uint32_t> children;  // tree: records
-  std::vector<format::Node3> records;   // number - 1
+  std::vector<GpuRecord> records;       // number - 1
   std::vector<format::Mask3> masks;
   std::uint32_t absent5 = 0;  // tree, dense: record where Node5 has no child
   bool skippable = true;      // background 0: what is absent contributes nothing

@@ -38,7 +38,7 @@ Amount measure(const format::GridView& view) {
   format::Values values;
   format::Mask3 active;
   for (const format::GridView::Leaf& leaf : view.leaves()) {
-    format::decodeBrick(leaf.node, leaf.mask, leaf.brick, values, active);
+    format::decodeBrick(leaf.node, leaf.mask, leaf.brick, view.frame().background, values, active);
     for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) {
       if (format::maskBit(active, i)) add(values[i], 1);
     }

@@ -20,10 +20,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     node.brick = encoding << kEncodingShift;
     node.mask = encoding >= kEncodingR8 ? kMaskTexel : kMaskAll;
     node.scale = 1;
-    node.tile = -1;
     Values values;
     Mask3 active;
-    decodeBrick(node, nullptr, brick, values, active);
+    decodeBrick(node, nullptr, brick, -1, values, active);
     for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
       const float expected = maskBit(active, i) ? static_cast<float>(texels[i]) : -1;
       if (values[i] != expected) std::abort();

@@ -16,7 +16,7 @@ void walk(const GridView& view) {
   Mask3 active;
   double sum = 0;
   for (const GridView::Leaf& leaf : view.leaves()) {
-    decodeBrick(leaf.node, leaf.mask, leaf.brick, values, active);
+    decodeBrick(leaf.node, leaf.mask, leaf.brick, view.frame().background, values, active);
     const float corner = view.voxel(leaf.origin[0], leaf.origin[1], leaf.origin[2]);
     if (!(corner == values[0])) std::abort();
     sum += static_cast<double>(values[511]);

@@ -108,6 +108,7 @@ TEST(InfoCommand, TellsGridsFramesAndBytes) {
   EXPECT_EQ(frame["bricks"], 5);
   EXPECT_EQ(frame["gpuBytes"]["r16"], 1024);
   EXPECT_EQ(frame["gpuBytes"]["masks"], 128);
+  EXPECT_EQ(frame["gpuBytes"]["records"], (5 + 1) * 16);  // of bricks, and of the tile
   EXPECT_EQ(frame["psnr"], nullptr);
   EXPECT_EQ(volume["grids"][1]["frames"][0]["present"], false);
 }

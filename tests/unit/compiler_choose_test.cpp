@@ -114,7 +114,7 @@ double decodedError(const ImportedGrid& grid, const ChosenGrid& chosen) {
     node.scale = brick.scale;
     format::Values values;
     format::Mask3 active;
-    format::decodeBrick(node, &grid.leaves[i].active, brick.payload, values, active);
+    format::decodeBrick(node, &grid.leaves[i].active, brick.payload, grid.background, values, active);
     for (std::uint32_t v = 0; v < format::kBrickVoxels; ++v) {
       EXPECT_EQ(format::maskBit(active, v), format::maskBit(grid.leaves[i].active, v));
       if (!format::maskBit(active, v)) continue;

@@ -117,12 +117,12 @@ void checkPromise(const Brick& brick, const Candidate& candidate) {
   } else if (brick.activeCount == format::kBrickVoxels) {
     mask = format::kMaskAll;
   }
-  const format::Node3 node{candidate.encoding << format::kEncodingShift, mask, candidate.lo, candidate.scale, kTile, 0};
+  const format::Node3 node{candidate.encoding << format::kEncodingShift, mask, candidate.lo, candidate.scale, 0};
   const auto bytes = format::brickBytes(candidate.encoding);
   ASSERT_TRUE(bytes.has_value());
   format::Values values;
   format::Mask3 active;
-  format::decodeBrick(node, &brick.active, std::span(candidate.payload).first(*bytes), values, active);
+  format::decodeBrick(node, &brick.active, std::span(candidate.payload).first(*bytes), kTile, values, active);
   ASSERT_EQ(std::memcmp(&active, &brick.active, sizeof active), 0);
   double squared = 0, largest = 0;
   for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) {

@@ -13,8 +13,8 @@ namespace {
 
 using namespace billow::format;
 
-Node3 makeNode(std::uint32_t encoding, std::uint32_t mask, float lo = 0, float scale = 1, float tile = -1) {
-  return {encoding << kEncodingShift, mask, lo, scale, tile, 0};
+Node3 makeNode(std::uint32_t encoding, std::uint32_t mask, float lo = 0, float scale = 1) {
+  return {encoding << kEncodingShift, mask, lo, scale, 0};
 }
 
 // Where the voxel (x, y, z) of a brick lies once its packed axis has changed places with z.
@@ -87,12 +87,12 @@ TEST(Brick, rawTexelsHaveXFastest) {
   }
 }
 
-TEST(Brick, constantIsLoWhereActiveAndTileElsewhere) {
+TEST(Brick, constantIsLoWhereActiveAndTheBackgroundElsewhere) {
   Mask3 mask{};
   mask.words[3] = 0x80000001u;
   Values values;
   Mask3 active;
-  decodeBrick(makeNode(kEncodingConstant, 0, 2.5f, 100.0f, 0.25f), &mask, {}, values, active);
+  decodeBrick(makeNode(kEncodingConstant, 0, 2.5f, 100.0f), &mask, {}, 0.25f, values, active);
   for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
     const bool on = i == 96 || i == 127;
     EXPECT_EQ(values[i], on ? 2.5f : 0.25f) << i;
@@ -104,7 +104,7 @@ TEST(Brick, maskAllNeedsNoMask) {
   const std::vector<std::byte> bytes(512, std::byte{3});
   Values values;
   Mask3 active;
-  decodeBrick(makeNode(kEncodingR8, kMaskAll, 1.0f, 0.5f), nullptr, bytes, values, active);
+  decodeBrick(makeNode(kEncodingR8, kMaskAll, 1.0f, 0.5f), nullptr, bytes, -1.0f, values, active);
   for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
     EXPECT_EQ(values[i], 2.5f);
     EXPECT_TRUE(maskBit(active, i));
@@ -118,8 +118,8 @@ TEST(Brick, texelMaskIsWhereTheTexelIsNotZero) {
   for (const std::uint32_t encoding : {kEncodingR8, kEncodingR16}) {
     Values values;
     Mask3 active;
-    decodeBrick(makeNode(encoding, kMaskTexel, 1.0f, 2.0f, -4.0f), nullptr,
-                std::span(bytes).first(*brickBytes(encoding)), values, active);
+    decodeBrick(makeNode(encoding, kMaskTexel, 1.0f, 2.0f), nullptr, std::span(bytes).first(*brickBytes(encoding)),
+                -4.0f, values, active);
     for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
       float expected = -4.0f;
       if (i == voxelIndex(5, 0, 0)) expected = 15.0f;
@@ -136,7 +136,7 @@ TEST(Brick, indexedMaskHidesTexels) {
   mask.words[0] = 2;
   Values values;
   Mask3 active;
-  decodeBrick(makeNode(kEncodingR8, 12345, 0.0f, 1.0f, 9.0f), &mask, bytes, values, active);
+  decodeBrick(makeNode(kEncodingR8, 12345, 0.0f, 1.0f), &mask, bytes, 9.0f, values, active);
   EXPECT_EQ(values[0], 9.0f);
   EXPECT_EQ(values[1], 1.0f);
   EXPECT_EQ(values[2], 9.0f);
@@ -160,11 +160,13 @@ TEST(Brick, sizesAndAxes) {
   const std::uint32_t axes[] = {2, 2, 1, 0, 2, 1, 0, 2, 2};
   for (std::uint32_t encoding = 0; encoding < kEncodingCount; ++encoding) {
     EXPECT_EQ(brickBytes(encoding), bytes[encoding]);
+    EXPECT_EQ(brickUnits(encoding), bytes[encoding] / 64);
     EXPECT_EQ(packedAxis(encoding), axes[encoding]);
   }
   EXPECT_EQ(brickBytes(kEncodingCount), std::nullopt);
-  EXPECT_EQ(encodingOf({0x7abcdef0u, 0, 0, 0, 0, 0}), 7u);
-  EXPECT_EQ(unitOf({0x7abcdef0u, 0, 0, 0, 0, 0}), 0xabcdef0u);
+  EXPECT_EQ(brickUnits(kEncodingCount), 0u);
+  EXPECT_EQ(encodingOf({0x7abcdef0u, 0, 0, 0, 0}), 15u);
+  EXPECT_EQ(unitOf({0x7abcdef0u, 0, 0, 0, 0}), 0x2bcdef0u);
 }
 
 }  // namespace

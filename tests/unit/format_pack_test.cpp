@@ -98,15 +98,15 @@ TEST(Pack, AnyPageSizeGivesTheSameContent) {
 TEST(Pack, PageOfFindsClosedAndOpenPages) {
   const TempFolder folder;
   PackWriter::Options options;
-  options.pageBytes = 256;
+  options.pageBytes = 128;
   PackWriter writer(folder / "a.blw", options);
-  const std::vector<std::byte> unit(128);
+  const std::vector<std::byte> unit(kBrickUnitBytes);
   const std::uint32_t child = 7;
   for (std::uint32_t i = 0; i < 7; ++i) {
     EXPECT_EQ(writer.append(Stream::unit, unit.data(), 1), i);
     EXPECT_EQ(writer.append(Stream::child, &child, 1), i);
   }
-  // 132 bytes each: one pair fills a page to where the next unit does not fit.
+  // 68 bytes each: one pair fills a page to where the next unit does not fit.
   for (std::uint32_t i = 0; i < 7; ++i) {
     EXPECT_EQ(writer.pageOf(Stream::unit, i), i);
     EXPECT_EQ(writer.pageOf(Stream::child, i), i);
@@ -121,7 +121,7 @@ TEST(GridView, VoxelEqualsDecodedBricksAndTiles) {
     for (const GridView::Leaf& leaf : view->leaves()) {
       Values values;
       Mask3 active;
-      decodeBrick(leaf.node, leaf.mask, leaf.brick, values, active);
+      decodeBrick(leaf.node, leaf.mask, leaf.brick, frame.background, values, active);
       for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
         EXPECT_EQ(values[i],
                   view->voxel(leaf.origin[0] + (i >> 6), leaf.origin[1] + (i >> 3 & 7), leaf.origin[2] + (i & 7)));
@@ -195,7 +195,7 @@ TEST(Pack, RefusedWritesThrowAndLeaveNothing) {
     bool refused = false;
     try {
       PackWriter writer(folder / "a.blw", {});
-      for (std::uint32_t i = 0; i < 40; ++i) writer.append(Stream::unit, tests::randomBytes(12800, i).data(), 100);
+      for (std::uint32_t i = 0; i < 40; ++i) writer.append(Stream::unit, tests::randomBytes(12800, i).data(), 200);
       writer.finish({});
     } catch (const std::system_error& error) {
       refused = std::string(error.what()).find(folder / "a.blw") != std::string::npos;

@@ -79,7 +79,7 @@ const std::map<std::string, Layout>& layouts() {
          FIELD(GridFrame, squaredError),  FIELD(GridFrame, indexToWorld),  FIELD(GridFrame, activeVoxels),
          FIELD(GridFrame, pageListBegin), FIELD(GridFrame, pageListCount), FIELD(GridFrame, node4Count),
          FIELD(GridFrame, node3Count),    FIELD(GridFrame, maskCount),     FIELD(GridFrame, childCount),
-         FIELD(GridFrame, brickCount)}}},
+         FIELD(GridFrame, tileCount),     FIELD(GridFrame, brickUnits),    FIELD(GridFrame, brickCount)}}},
       {"PageRecord",
        {sizeof(PageRecord),
         {FIELD(PageRecord, offset), FIELD(PageRecord, checksum), FIELD(PageRecord, storedSize),
@@ -96,8 +96,7 @@ const std::map<std::string, Layout>& layouts() {
          FIELD(Node4, mean), FIELD(Node4, mask)}}},
       {"Node3",
        {sizeof(Node3),
-        {FIELD(Node3, brick), FIELD(Node3, mask), FIELD(Node3, lo), FIELD(Node3, scale), FIELD(Node3, tile),
-         FIELD(Node3, mean)}}},
+        {FIELD(Node3, brick), FIELD(Node3, mask), FIELD(Node3, lo), FIELD(Node3, scale), FIELD(Node3, mean)}}},
       {"Mask3", {sizeof(Mask3), {FIELD(Mask3, words)}}}};
   return all;
 }

@@ -302,6 +302,9 @@ TEST(Rules, GridsAndFrames) {
 
 TEST(Rules, GridFrames) {
   expectIssue(215, [](PackImage& i) { i.gridFrames[0].reserved = 1; });
+  for (std::uint32_t c = kBrickClassCount; c < kBrickClassSlots; ++c) {
+    expectIssue(215, [&](PackImage& i) { i.gridFrames[0].brickCount[c] = 1; });
+  }
   expectIssue(216, [](PackImage& i) { i.gridFrames[0].flags |= 2; });
   expectIssue(217, [](PackImage& i) { i.gridFrames[0].indexToWorld[5] = 0; });
   expectIssue(217, [](PackImage& i) { i.gridFrames[0].indexToWorld[3] = std::numeric_limits<double>::quiet_NaN(); });
@@ -463,7 +466,7 @@ TEST(Rules, Nodes) {
 
 TEST(Rules, Bricks) {
   expectIssue(501, [](PackImage& i) { node3(i, 0).brick = kEncodingCount << kEncodingShift; });
-  expectIssue(502, [](PackImage& i) { node3(i, 0).brick |= 0x0ffffff0u; });
+  expectIssue(502, [](PackImage& i) { node3(i, 0).brick |= 0x07fffff0u; });
   expectIssue(502, [](PackImage& i) { node3(i, 4).brick = 1; });
   expectIssue(503, [](PackImage& i) { node3(i, 0).mask = 77; });
   expectIssue(503, [](PackImage& i) { node3(i, 1).mask = kMaskTexel; });
@@ -471,8 +474,8 @@ TEST(Rules, Bricks) {
   expectIssue(504, [](PackImage& i) { node3(i, 3).scale = 3e34f; });
   expectIssue(505, [](PackImage& i) { node3(i, 4).scale = 1; });
   expectIssue(506, [](PackImage& i) { node3(i, 2).mean = -0.5f; });
+  expectIssue(506, [](PackImage& i) { node3(i, 0).mean = 1; });
   expectIssue(507, [](PackImage& i) { node3(i, 2).brick += 1; });
-  expectIssue(508, [](PackImage& i) { node3(i, 0).tile = -0.5f; });
 }
 
 TEST(Rules, Constants) {
@@ -480,6 +483,8 @@ TEST(Rules, Constants) {
   expectIssue(601, [](PackImage& i) { ++i.gridFrames[0].node3Count; });
   expectIssue(601, [](PackImage& i) { ++i.gridFrames[0].maskCount; });
   expectIssue(601, [](PackImage& i) { ++i.gridFrames[0].childCount; });
+  expectIssue(601, [](PackImage& i) { ++i.gridFrames[0].tileCount; });
+  expectIssue(601, [](PackImage& i) { ++i.gridFrames[0].brickUnits; });
   for (std::uint32_t c = 0; c < kBrickClassCount; ++c) {
     expectIssue(601, [&](PackImage& i) { ++i.gridFrames[0].brickCount[c]; });
   }

@@ -171,6 +171,24 @@ TEST_F(Upload, CountsTheBytesThatTheFormatPromises) {
   gpu().waitIdle();
 }
 
+TEST_F(Upload, HasOneRecordForEqualTilesAndNoneForTheBackground) {
+  const format::Pack pack = openPack(oneGridPack(0, [](GridFrameBuilder& grid) {
+    grid.brick({10, 10, 10}, format::kEncodingConstant, {}, 1, 0, format::kMaskAll);
+    grid.tile({0, 1, 0}, 2.5f);
+    grid.tile({0, 1, 1}, 2.5f);
+    grid.tile({1, 1, 0}, 0);
+    grid.tile({1, 1, 1}, 3.5f);
+  }));
+  const auto renderer = makeRenderer();
+  for (const Index index : {Index::flat, Index::tree, Index::dense}) {
+    const auto frame = renderer->upload(pack, 0, 0, {.index = index});
+    ASSERT_TRUE(frame.has_value()) << frame.error().message;
+    EXPECT_EQ((*frame)->stats().recordBytes, 3u * 16u);
+    EXPECT_EQ((*frame)->stats().recordBytes, format::gpuBytes(pack.gridFrames()[0]).recordBytes);
+    gpu().waitIdle();
+  }
+}
+
 TEST_F(Upload, RefusesWhatExceedsTheBudgetAndAllocatesNothing) {
   const format::Pack pack = openPack(everything());
   const auto renderer = makeRenderer({.gpuBudget = 24000});

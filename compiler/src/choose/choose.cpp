@@ -177,8 +177,7 @@ class GridChooser {
     format::GridFrame frame = shape(grid_, where);
     for (std::size_t i = 0; i < bricks_.size(); ++i) {
       const Tried& tried = bricks_[i].tried[chosen[i]];
-      const std::uint32_t bytes = *format::brickBytes(tried.encoding);
-      if (bytes != 0) ++frame.brickCount[std::countr_zero(bytes) - 7];
+      format::countBrick(frame, tried.encoding);
       if (!tried.texelMask && counts_[i] != format::kBrickVoxels) ++frame.maskCount;
     }
     return format::gpuBytes(frame).total();

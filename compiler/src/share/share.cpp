@@ -9,6 +9,8 @@
 #include <memory>
 #include <tuple>
 
+#include "billow/format/gpu_size.h"
+
 namespace billow::compiler {
 namespace {
 
@@ -116,10 +118,9 @@ class TreeBuilder {
     Node3 node{};
     node.lo = brick.lo;
     node.scale = brick.scale;
-    node.tile = grid_.background;
     const auto payloadBytes = static_cast<std::uint32_t>(brick.payload.size());
     std::uint32_t unit = 0;
-    if (payloadBytes != 0) unit = intern(Stream::unit, brick.payload.data(), payloadBytes / 128);
+    if (payloadBytes != 0) unit = intern(Stream::unit, brick.payload.data(), payloadBytes / format::kBrickUnitBytes);
     node.brick = brick.encoding << format::kEncodingShift | unit;
     const bool full = std::all_of(std::begin(leaf.active.words), std::end(leaf.active.words),
                                   [](std::uint32_t word) { return word == ~0u; });
@@ -133,7 +134,7 @@ class TreeBuilder {
     }
     if (payloadBytes != 0) bricks_.push_back(node.brick);
     format::Mask3 active;
-    format::decodeBrick(node, &leaf.active, brick.payload, values_, active);
+    format::decodeBrick(node, &leaf.active, brick.payload, grid_.background, values_, active);
     return finish3(node);
   }
 
@@ -182,7 +183,6 @@ class TreeBuilder {
     node.brick = format::kEncodingConstant << format::kEncodingShift;
     node.mask = format::kMaskAll;
     node.lo = value;
-    node.tile = grid_.background;
     values_.fill(value);
     return finish3(node);
   }
@@ -210,6 +210,7 @@ class TreeBuilder {
     node->flags = format::kNodeTileActive;
     node->tile = node->min = node->max = node->mean = tile.value;
     frame_.node5 = intern(Stream::node5, node.get(), 1);
+    noteTile(tile.value);
     growRange(tile.value, tile.value);
   }
 
@@ -232,7 +233,13 @@ class TreeBuilder {
     Node4 node{};
     node.flags = format::kNodeTileActive;
     node.tile = node.min = node.max = node.mean = value;
+    noteTile(value);
     return {intern(Stream::node4, &node, 1), value, value, static_cast<double>(value)};
+  }
+
+  void noteTile(float value) {
+    const auto bits = std::bit_cast<std::uint32_t>(value);
+    if (bits != std::bit_cast<std::uint32_t>(grid_.background)) tileBits_.push_back(bits);
   }
 
   template <class Node>
@@ -275,10 +282,8 @@ class TreeBuilder {
     countDistinct(lists_);
     for (const auto& [isRoot, index, children] : lists_) frame_.childCount += children;
     countDistinct(bricks_);
-    for (const std::uint32_t brick : bricks_) {
-      const std::uint32_t bytes = *format::brickBytes(brick >> format::kEncodingShift);
-      ++frame_.brickCount[std::countr_zero(bytes) - 7];  // 128, 256, 512, 1024: BrickClass order
-    }
+    for (const std::uint32_t brick : bricks_) format::countBrick(frame_, brick >> format::kEncodingShift);
+    frame_.tileCount = countDistinct(tileBits_);
   }
 
   Sharer& sharer_;
@@ -289,7 +294,7 @@ class TreeBuilder {
   format::Values values_;
   std::map<std::uint32_t, std::map<std::uint32_t, Summary>> nodes4_;  // by Node5 bit, then Node4 bit
   std::vector<std::pair<std::uint32_t, float>> tiles4_;
-  std::vector<std::uint32_t> nodes3_, nodes4Used_, masks_, bricks_, pages_;
+  std::vector<std::uint32_t> nodes3_, nodes4Used_, masks_, bricks_, tileBits_, pages_;
   std::vector<std::tuple<bool, std::uint32_t, std::uint32_t>> lists_;  // is Node5, its index, children
   std::uint64_t cutTiles_ = 0;
 };

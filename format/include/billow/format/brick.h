@@ -34,6 +34,18 @@ constexpr std::optional<std::uint32_t> brickBytes(std::uint32_t encoding) {
   return std::nullopt;
 }
 
+// 64-byte units of a stored brick; 0 for a constant and for an unknown encoding.
+constexpr std::uint32_t brickUnits(std::uint32_t encoding) {
+  return brickBytes(encoding).value_or(0) / kBrickUnitBytes;
+}
+
+// Class of a known encoding other than constant.
+constexpr BrickClass brickClass(std::uint32_t encoding) {
+  if (encoding <= kEncodingBc7X) return BrickClass::bc7;
+  if (encoding <= kEncodingBc4X) return BrickClass::bc4;
+  return encoding == kEncodingR8 ? BrickClass::r8 : BrickClass::r16;
+}
+
 // Which axis (0 x, 1 y, 2 z) changes places with z when the brick is stored; 2 where none does.
 constexpr std::uint32_t packedAxis(std::uint32_t encoding) {
   if (encoding == kEncodingBc7Y || encoding == kEncodingBc4Y) return 1;
@@ -64,8 +76,9 @@ constexpr bool maskBit(const Mask3& mask, std::uint32_t index) {
 }
 
 // All 512 values and the active mask of a Node3. `mask` is read only where node.mask is an index; `brick` holds
-// brickBytes(encoding) bytes.
-void decodeBrick(const Node3& node, const Mask3* mask, std::span<const std::byte> brick, Values& values, Mask3& active);
+// brickBytes(encoding) bytes; inactive voxels become `background`, the grid frame's.
+void decodeBrick(const Node3& node, const Mask3* mask, std::span<const std::byte> brick, float background,
+                 Values& values, Mask3& active);
 
 }  // namespace billow::format
 

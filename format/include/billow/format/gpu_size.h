@@ -13,12 +13,16 @@ enum class GpuIndex : std::uint32_t {
   tree = 1,  // Node5 and Node4s with a rank per mask word, and child lists
 };
 
+// What the GPU reads of a Node3, or of an active tile: its brick, mask, lo and scale.
+inline constexpr std::uint64_t kGpuRecordBytes = 16;
+
 struct GpuBytes {
   GpuIndex index = GpuIndex::flat;
   std::uint64_t indexBytes = 0;
-  std::uint64_t node3Bytes = 0;
+  std::uint64_t recordBytes = 0;  // one record a Node3, and one a distinct value of active tiles
   std::uint64_t maskBytes = 0;
-  std::uint64_t brickBytes[kBrickClassCount] = {};
+  std::uint64_t brickBytes = 0;
+  std::uint64_t classBytes[kBrickClassCount] = {};  // of brickBytes, by class
   std::uint64_t total() const;
 };
 
@@ -31,6 +35,9 @@ struct CellBox {
 CellBox cellBox(const GridFrame& gridFrame);
 
 GpuBytes gpuBytes(const GridFrame& gridFrame);
+
+// Adds a distinct brick of a known encoding to the grid frame's counts; a constant adds nothing.
+void countBrick(GridFrame& gridFrame, std::uint32_t encoding);
 
 }  // namespace billow::format
 

@@ -31,9 +31,10 @@ BILLOW_CONST kNode3SpanLog2 = 3u;   // 8 voxels
 BILLOW_CONST kIndexSpan = 4096u;    // voxels per axis that one grid may span in a frame
 BILLOW_CONST kBrickVoxels = 512u;
 
-// ---- Node3.brick = encoding << kEncodingShift | unit. On disk `unit` is a global index of 128-byte brick units.
-BILLOW_CONST kEncodingShift = 28u;
-BILLOW_CONST kBrickUnitMask = 0x0fffffffu;
+// ---- Node3.brick = encoding << kEncodingShift | unit. On disk `unit` is a global index of 64-byte brick units.
+BILLOW_CONST kEncodingShift = 27u;
+BILLOW_CONST kBrickUnitMask = 0x07ffffffu;
+BILLOW_CONST kBrickUnitBytes = 64u;
 BILLOW_CONST kEncodingConstant = 0u;  // no brick: every active voxel is `lo`
 BILLOW_CONST kEncodingBc7Z = 1u;      // 8x8x2 RGBA texels, four z values a texel; 128 bytes
 BILLOW_CONST kEncodingBc7Y = 2u;      // the same with y and z exchanged
@@ -58,17 +59,16 @@ BILLOW_CONST kNodeTileActive = 1u;
 BILLOW_CONST kNone = 0xffffffffu;
 
 // A brick's header: 8x8x8 voxels. An active voxel's value is lo + scale * texel, in single precision, product rounded
-// before the sum, texel an integer in [0, 255] (R16: [0, 65535]); an inactive voxel's is `tile`.
+// before the sum, texel an integer in [0, 255] (R16: [0, 65535]); an inactive voxel's is the grid frame's background.
 // Voxel (x, y, z) is bit z & 31 ... of its mask: bit index x * 64 + y * 8 + z, word index >> 5, bit index & 31.
 struct Node3 {
   BILLOW_U32 brick;
   BILLOW_U32 mask;
   BILLOW_F32 lo;
   BILLOW_F32 scale;
-  BILLOW_F32 tile;
   BILLOW_F32 mean;  // of all 512 reconstructed values
 };
-BILLOW_ASSERT_SIZE(Node3, 24);
+BILLOW_ASSERT_SIZE(Node3, 20);
 
 struct Mask3 {
   BILLOW_U32 words[16];
@@ -237,6 +237,7 @@ inline constexpr std::uint32_t kGridPresent = 1;  // GridFrame.flags: the source
 
 enum class BrickClass : std::uint32_t { bc7 = 0, bc4 = 1, r8 = 2, r16 = 3 };
 inline constexpr std::uint32_t kBrickClassCount = 4;
+inline constexpr std::uint32_t kBrickClassSlots = 8;  // those from kBrickClassCount on are reserved
 
 // One grid in one frame: the frame's constants and root.
 struct GridFrame {
@@ -260,15 +261,17 @@ struct GridFrame {
   std::uint32_t node4Count;  // distinct, reachable from node5
   std::uint32_t node3Count;
   std::uint32_t maskCount;
-  std::uint32_t childCount;                    // children of the Node5 and of each distinct Node4, summed
-  std::uint32_t brickCount[kBrickClassCount];  // distinct values of Node3.brick, by class
+  std::uint32_t childCount;  // children of the Node5 and of each distinct Node4, summed
+  std::uint32_t tileCount;   // distinct values of active tiles, by their bits; the background is not counted
+  std::uint32_t brickUnits;  // units of all distinct values of Node3.brick, summed
+  std::uint32_t brickCount[kBrickClassSlots];  // distinct values of Node3.brick, by class
 };
-BILLOW_ASSERT_SIZE(GridFrame, 224);
+BILLOW_ASSERT_SIZE(GridFrame, 248);
 
 // ---- Pages. A page holds a run of each of six global arrays, one after the other in this order, no gaps:
 enum class Stream : std::uint32_t { unit = 0, mask = 1, node5 = 2, node4 = 3, node3 = 4, child = 5 };
 inline constexpr std::uint32_t kStreamCount = 6;
-inline constexpr std::uint32_t kStreamItemBytes[kStreamCount] = {128, 64, 4120, 536, 24, 4};
+inline constexpr std::uint32_t kStreamItemBytes[kStreamCount] = {kBrickUnitBytes, 64, 4120, 536, 20, 4};
 inline constexpr std::uint32_t kMaxPageBytes = 1u << 20;  // raw; a reader may refuse more
 
 struct StreamRange {  // [first, first + count) of the stream's global array
