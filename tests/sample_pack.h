@@ -239,10 +239,12 @@ inline std::vector<std::byte> samplePack(format::PackWriter::Options options = {
     std::fill_n(half.words, 8, 0x0ff0f00fu);
     GridFrameBuilder first(writer, 0);
     first.brick({2, 3, 4}, kEncodingBc7Y, randomBytes(128, 1), 0.25f, 0.001f, 0, half);
-    first.brick({2, 3, 5}, kEncodingBc4X, randomBytes(256, 2), -1, 0.01f, kMaskAll);
-    first.brick({2, 3, 6}, kEncodingR8, randomBytes(512, 3), 0, 0.5f, kMaskTexel);
-    first.brick({40, 3, 4}, kEncodingR16, randomBytes(1024, 4), 1, 0.0001f, 0, half);
+    first.brick({2, 3, 5}, kEncodingCoarse, randomBytes(64, 2), -1, 0.0002f, kMaskAll);
+    first.brick({2, 3, 6}, uniformEncoding(3), randomBytes(192, 3), 0, 0.5f, kMaskTexel);
+    first.brick({40, 3, 4}, kEncodingUniform16, randomBytes(1024, 4), 1, 0.0001f, 0, half);
     first.brick({2, 3, 7}, kEncodingConstant, {}, 3, 0, kMaskAll);
+    first.brick({2, 3, 8}, localEncoding(4), randomBytes(288, 6), 0, 0.001f, kMaskTexel);
+    first.brick({2, 3, 9}, uniformEncoding(8), randomBytes(512, 7), 0, 0.1f, kMaskAll);
     first.tile({4, 0, 1}, 0.5f);
     tables.gridFrames.push_back(first.finish(tables));
     tables.gridFrames.push_back(absentGridFrame());

@@ -1,5 +1,7 @@
 #include "billow/format/brick.h"
 
+#include <utility>
+
 namespace billow::format {
 namespace {
 
@@ -33,46 +35,117 @@ void decodeBc7(std::uint32_t encoding, const std::byte* bytes, Texels& texels) {
   }
 }
 
-void decodeBc4(std::uint32_t encoding, const std::byte* bytes, Texels& texels) {
-  const Strides stride = storedStrides(encoding);
-  for (std::uint32_t block = 0; block < 32; ++block) {
-    std::uint8_t decoded[16];
-    decodeBc4Block(bytes + 8 * block, decoded);
-    std::uint16_t* corner =
-        &texels[(block & 1) * 4 * stride.x + (block >> 1 & 1) * 4 * stride.y + (block >> 2) * stride.z];
-    for (std::uint32_t i = 0; i < 16; ++i) corner[(i & 3) * stride.x + (i >> 2) * stride.y] = decoded[i];
+void unpackIndices(const std::byte* bytes, std::uint32_t bits, Texels& indices) {
+  const std::uint32_t last = (1u << bits) - 1;
+  std::uint32_t pending = 0, held = 0;
+  for (std::uint16_t& index : indices) {
+    for (; held < bits; held += 8) pending |= std::to_integer<std::uint32_t>(*bytes++) << held;
+    index = static_cast<std::uint16_t>(pending & last);
+    pending >>= bits;
+    held -= bits;
   }
 }
 
-// Raw texels, x fastest; `high` is null where a texel is one byte.
-void decodeRaw(const std::byte* low, const std::byte* high, Texels& texels) {
+// What index i of a cell with these ends stands for; `last` is the largest index.
+std::uint32_t localTexel(const std::byte* cell, std::uint32_t last, std::uint32_t index) {
+  const auto base = std::to_integer<std::uint32_t>(cell[0]);
+  const auto top = std::to_integer<std::uint32_t>(cell[1]);
+  return base * (last - index) + top * index;
+}
+
+void decodeLocal(const std::byte* bytes, std::uint32_t bits, Texels& texels) {
+  unpackIndices(bytes + kLocalCellBytes, bits, texels);
   for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
-    std::uint32_t texel = std::to_integer<std::uint32_t>(low[i]);
-    if (high != nullptr) texel |= std::to_integer<std::uint32_t>(high[i]) << 8;
-    texels[voxelIndex(i & 7, i >> 3 & 7, i >> 6)] = static_cast<std::uint16_t>(texel);
+    const std::byte* cell = bytes + 2 * localCell(i >> 6, i >> 3 & 7, i & 7);
+    texels[i] = static_cast<std::uint16_t>(localTexel(cell, (1u << bits) - 1, texels[i]));
   }
 }
 
-void activeFromTexels(const Texels& texels, Mask3& active) {
+// The two of four values along an axis that a voxel lies between, and their weights in quarters.
+struct Taps {
+  std::uint32_t at[2];
+  std::uint32_t weight[2];
+};
+
+constexpr Taps coarseTaps(std::uint32_t voxel) {
+  const std::uint32_t after = (voxel + 1) >> 1;  // one more than floor((voxel - 0.5) / 2)
+  const std::uint32_t near = (voxel & 1) != 0 ? 1 : 3;
+  return {{after == 0 ? 0 : after - 1, after > 3 ? 3 : after}, {4 - near, near}};
+}
+
+std::uint32_t coarseTexel(const std::byte* bytes, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+  const Taps X = coarseTaps(x), Y = coarseTaps(y), Z = coarseTaps(z);
+  std::uint32_t sum = 0;
+  for (std::uint32_t tap = 0; tap < 8; ++tap) {
+    const std::uint32_t i = tap >> 2, j = tap >> 1 & 1, k = tap & 1;
+    const auto value = std::to_integer<std::uint32_t>(bytes[(X.at[i] * 4 + Y.at[j]) * 4 + Z.at[k]]);
+    sum += value * X.weight[i] * Y.weight[j] * Z.weight[k];
+  }
+  return sum;
+}
+
+void decodeCoarse(const std::byte* bytes, Texels& texels) {
+  for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
+    texels[i] = static_cast<std::uint16_t>(coarseTexel(bytes, i >> 6, i >> 3 & 7, i & 7));
+  }
+}
+
+std::uint32_t bc7Texel(std::uint32_t encoding, const std::byte* bytes, std::array<std::uint32_t, 3> at) {
+  std::swap(at[packedAxis(encoding)], at[2]);
+  const auto [x, y, z] = at;
+  std::uint8_t rgba[16][4];
+  decodeBc7Block(bytes + ((z >> 2) * 4 + (y >> 2) * 2 + (x >> 2)) * 16, rgba);
+  return rgba[(y & 3) * 4 + (x & 3)][z & 3];
+}
+
+void activeFromIndices(std::uint32_t encoding, std::span<const std::byte> bytes, Mask3& active) {
+  Texels indices;
+  unpackIndices(bytes.data() + (isLocal(encoding) ? kLocalCellBytes : 0), indexBits(encoding), indices);
   active = {};
   for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
-    if (texels[i] != 0) active.words[i >> 5] |= 1u << (i & 31);
+    if (indices[i] != 0) active.words[i >> 5] |= 1u << (i & 31);
   }
 }
 
 }  // namespace
 
 void decodeTexels(std::uint32_t encoding, std::span<const std::byte> bytes, Texels& texels) {
-  if (encoding >= kEncodingBc7Z && encoding <= kEncodingBc7X) {
+  if (isBc7(encoding)) {
     decodeBc7(encoding, bytes.data(), texels);
-  } else if (encoding >= kEncodingBc4Z && encoding <= kEncodingBc4X) {
-    decodeBc4(encoding, bytes.data(), texels);
-  } else if (encoding == kEncodingR8) {
-    decodeRaw(bytes.data(), nullptr, texels);
-  } else if (encoding == kEncodingR16) {
-    decodeRaw(bytes.data(), bytes.data() + kBrickVoxels, texels);
+  } else if (encoding == kEncodingCoarse) {
+    decodeCoarse(bytes.data(), texels);
+  } else if (isLocal(encoding)) {
+    decodeLocal(bytes.data(), indexBits(encoding), texels);
+  } else if (indexBits(encoding) != 0) {
+    unpackIndices(bytes.data(), indexBits(encoding), texels);
   } else {
     texels.fill(0);
+  }
+}
+
+std::uint32_t decodeTexel(std::uint32_t encoding, std::span<const std::byte> bytes, std::uint32_t x, std::uint32_t y,
+                          std::uint32_t z) {
+  if (isBc7(encoding)) return bc7Texel(encoding, bytes.data(), {x, y, z});
+  if (encoding == kEncodingCoarse) return coarseTexel(bytes.data(), x, y, z);
+  const std::uint32_t bits = indexBits(encoding);
+  if (bits == 0) return 0;
+  const std::uint32_t index = decodeIndex(encoding, bytes, voxelIndex(x, y, z));
+  return isLocal(encoding) ? localTexel(bytes.data() + 2 * localCell(x, y, z), (1u << bits) - 1, index) : index;
+}
+
+std::uint32_t decodeIndex(std::uint32_t encoding, std::span<const std::byte> bytes, std::uint32_t voxel) {
+  const std::uint32_t bits = indexBits(encoding);
+  const std::uint32_t bit = (isLocal(encoding) ? kLocalCellBytes * 8 : 0) + voxel * bits;
+  std::uint32_t word = std::to_integer<std::uint32_t>(bytes[bit >> 3]);
+  if ((bit & 7) + bits > 8) word |= std::to_integer<std::uint32_t>(bytes[(bit >> 3) + 1]) << 8;
+  return word >> (bit & 7) & ((1u << bits) - 1);
+}
+
+void packIndices(const Texels& indices, std::uint32_t bits, std::byte* bytes) {
+  std::uint32_t pending = 0, held = 0;
+  for (const std::uint16_t index : indices) {
+    pending |= static_cast<std::uint32_t>(index) << held;
+    for (held += bits; held >= 8; held -= 8, pending >>= 8) *bytes++ = static_cast<std::byte>(pending & 0xff);
   }
 }
 
@@ -86,7 +159,7 @@ void decodeBrick(const Node3& node, const Mask3* mask, std::span<const std::byte
   Texels texels;
   decodeTexels(encodingOf(node), brick, texels);
   if (node.mask == kMaskTexel) {
-    activeFromTexels(texels, active);
+    activeFromIndices(encodingOf(node), brick, active);
   } else if (node.mask == kMaskAll) {
     for (std::uint32_t& word : active.words) word = 0xffffffffu;
   } else {

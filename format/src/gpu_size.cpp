@@ -5,7 +5,6 @@
 namespace billow::format {
 namespace {
 
-constexpr std::uint64_t kClassBytes[kBrickClassCount] = {128, 256, 512, 1024};
 // A rank (u16) for each mask word lets a child be found with one popcount.
 constexpr std::uint64_t kNode5IndexBytes = sizeof(Node5) + 1024 * sizeof(std::uint16_t);
 constexpr std::uint64_t kNode4IndexBytes = sizeof(Node4) + 128 * sizeof(std::uint16_t);
@@ -31,8 +30,10 @@ GpuBytes gpuBytes(const GridFrame& gridFrame) {
   if (gridFrame.node5 == kNone) return bytes;
   bytes.recordBytes = (std::uint64_t{gridFrame.node3Count} + gridFrame.tileCount) * kGpuRecordBytes;
   bytes.maskBytes = std::uint64_t{gridFrame.maskCount} * sizeof(Mask3);
-  bytes.brickBytes = std::uint64_t{gridFrame.brickUnits} * kBrickUnitBytes;
-  for (std::uint32_t i = 0; i < kBrickClassCount; ++i) bytes.classBytes[i] = gridFrame.brickCount[i] * kClassBytes[i];
+  for (std::uint32_t i = 0; i < kBrickClassCount; ++i) {
+    bytes.classBytes[i] = std::uint64_t{gridFrame.brickUnits[i]} * kBrickUnitBytes;
+    bytes.brickBytes += bytes.classBytes[i];
+  }
   const std::uint64_t payload = bytes.recordBytes + bytes.brickBytes;
   const std::uint64_t flat = cellBox(gridFrame).count() * sizeof(std::uint32_t);
   const std::uint64_t tree = kNode5IndexBytes + gridFrame.node4Count * kNode4IndexBytes +
@@ -45,8 +46,9 @@ GpuBytes gpuBytes(const GridFrame& gridFrame) {
 
 void countBrick(GridFrame& gridFrame, std::uint32_t encoding) {
   if (encoding == kEncodingConstant) return;
-  gridFrame.brickUnits += brickUnits(encoding);
-  ++gridFrame.brickCount[static_cast<std::uint32_t>(brickClass(encoding))];
+  const auto which = static_cast<std::uint32_t>(brickClass(encoding));
+  ++gridFrame.brickCount[which];
+  gridFrame.brickUnits[which] += brickUnits(encoding);
 }
 
 }  // namespace billow::format

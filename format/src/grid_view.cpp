@@ -34,38 +34,12 @@ void childOrigin(const std::uint32_t (&parent)[3], std::uint32_t bit, std::uint3
   origin[2] = parent[2] + ((bit & last) << spanLog2);
 }
 
-std::uint32_t byteAt(std::span<const std::byte> bytes, std::size_t index) {
-  return std::to_integer<std::uint32_t>(bytes[index]);
-}
-
-// One texel of a stored brick: what decodeTexels() gives for this voxel.
-std::uint32_t texelAt(std::uint32_t encoding, std::span<const std::byte> brick, std::uint32_t (&at)[3]) {
-  if (encoding == kEncodingConstant) return 0;
-  std::swap(at[packedAxis(encoding)], at[2]);
-  const auto [x, y, z] = at;
-  const std::uint32_t corner = (y >> 2) * 2 + (x >> 2);
-  const std::uint32_t inBlock = (y & 3) * 4 + (x & 3);
-  if (encoding <= kEncodingBc7X) {
-    std::uint8_t rgba[16][4];
-    decodeBc7Block(brick.data() + std::size_t{(z >> 2) * 4 + corner} * 16, rgba);
-    return rgba[inBlock][z & 3];
-  }
-  if (encoding <= kEncodingBc4X) {
-    std::uint8_t texels[16];
-    decodeBc4Block(brick.data() + std::size_t{z * 4 + corner} * 8, texels);
-    return texels[inBlock];
-  }
-  const std::uint32_t index = z * 64 + y * 8 + x;
-  return byteAt(brick, index) | (encoding == kEncodingR16 ? byteAt(brick, kBrickVoxels + index) << 8 : 0u);
-}
-
 float valueIn(const GridView::Leaf& leaf, float background, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
   const Node3& node = leaf.node;
   if (leaf.mask != nullptr && !maskBit(*leaf.mask, voxelIndex(x, y, z))) return background;
-  std::uint32_t at[3] = {x, y, z};
-  const std::uint32_t texel = texelAt(encodingOf(node), leaf.brick, at);
-  if (node.mask == kMaskTexel && texel == 0) return background;
-  return reconstruct(node.lo, node.scale, texel);
+  const std::uint32_t encoding = encodingOf(node);
+  if (node.mask == kMaskTexel && decodeIndex(encoding, leaf.brick, voxelIndex(x, y, z)) == 0) return background;
+  return reconstruct(node.lo, node.scale, decodeTexel(encoding, leaf.brick, x, y, z));
 }
 
 template <class Region>

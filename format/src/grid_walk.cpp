@@ -13,11 +13,12 @@ namespace {
 constexpr std::uint16_t kNode4Last = (1u << kNode4SpanLog2) - 1;
 constexpr std::uint16_t kNode5Last = (1u << kNode5SpanLog2) - 1;
 
-// What a unit is to the bricks: not used, inside of one, or the first of one (kFirstUnit, with a bit for each axis by
-// which it is packed: bricks that differ in that alone may share their bytes, and count as two) of a class.
+// What a unit is to the bricks: not used, inside of one, or the first of one. That is kFirstUnit and the encoding, or
+// kFirstBc7 with a bit for each axis by which it is packed: BC7 bricks that differ in that alone may share their bytes,
+// and count as two.
 constexpr std::uint8_t kInsideBrick = 1;
-constexpr std::uint8_t kFirstUnit = 0x80;
-constexpr std::uint32_t kClassShift = 4;
+constexpr std::uint8_t kFirstUnit = 0x40;
+constexpr std::uint8_t kFirstBc7 = 0x80;
 
 // What an item of another array is.
 constexpr std::uint8_t kReached = 1;
@@ -34,7 +35,7 @@ const T* as(const std::byte* data) {
 
 // H of the standard: what the largest texel stands for.
 float largestValue(const Node3& node) {
-  return reconstruct(node.lo, node.scale, encodingOf(node) == kEncodingR16 ? 65535 : 255);
+  return reconstruct(node.lo, node.scale, largestTexel(encodingOf(node)));
 }
 
 std::array<std::uint16_t, 3> childOrigin(std::uint32_t bit, std::uint32_t log2, std::uint32_t childSpanLog2) {
@@ -270,18 +271,18 @@ bool GridWalk::visitNode3(const Node3& node, std::uint32_t index, BrickFacts& fa
 
 // Counts a brick when it is met first; false where it cuts another.
 bool GridWalk::countUnits(std::uint32_t local, std::uint32_t encoding, std::uint32_t units) {
-  const auto first =
-      static_cast<std::uint8_t>(kFirstUnit | static_cast<std::uint32_t>(brickClass(encoding)) << kClassShift);
-  const auto axis = static_cast<std::uint8_t>(1u << packedAxis(encoding));
   const std::span<std::uint8_t> own = std::span(reached_[number(Stream::unit)]).subspan(local, units);
-  if ((own[0] & ~7u) == first) {
-    if ((own[0] & axis) == 0) countBrick(counted_, encoding);
-    own[0] = static_cast<std::uint8_t>(own[0] | axis);
+  const auto first = isBc7(encoding) ? static_cast<std::uint8_t>(kFirstBc7 | 1u << packedAxis(encoding))
+                                     : static_cast<std::uint8_t>(kFirstUnit | encoding);
+  if (isBc7(encoding) && (own[0] & kFirstBc7) != 0) {
+    if ((own[0] & first) != first) countBrick(counted_, encoding);
+    own[0] |= first;
     return true;
   }
+  if (own[0] == first) return true;
   if (!std::all_of(own.begin(), own.end(), [](std::uint8_t unit) { return unit == 0; })) return false;
   std::fill(own.begin(), own.end(), kInsideBrick);
-  own[0] = static_cast<std::uint8_t>(first | axis);
+  own[0] = first;
   countBrick(counted_, encoding);
   return true;
 }
@@ -354,11 +355,14 @@ void GridWalk::checkTotals() {
   compare("Node3", frame_.node3Count, node3Count_);
   compare("masks", frame_.maskCount, maskCount_);
   compare("child list entries", frame_.childCount, childCount_);
-  constexpr std::string_view kClassNames[kBrickClassCount] = {"BC7 bricks", "BC4 bricks", "R8 bricks", "R16 bricks"};
+  constexpr std::string_view kClassNames[kBrickClassCount] = {"BC7 bricks", "uniform bricks", "local bricks",
+                                                              "coarse bricks"};
+  constexpr std::string_view kUnitNames[kBrickClassCount] = {"BC7 units", "uniform units", "local units",
+                                                             "coarse units"};
   for (std::uint32_t i = 0; i < kBrickClassCount; ++i) {
     compare(kClassNames[i], frame_.brickCount[i], counted_.brickCount[i]);
+    compare(kUnitNames[i], frame_.brickUnits[i], counted_.brickUnits[i]);
   }
-  compare("brick units", frame_.brickUnits, counted_.brickUnits);
   compare("values of tiles", frame_.tileCount, tiles_.size());
   if (frame_.activeVoxels != active_) {
     sink_.report(Rule::activeVoxels, place_, fmt::format("It says {}, and reaches {}.", frame_.activeVoxels, active_));

@@ -138,8 +138,7 @@ class ItemRules {
     if (units == 0 ? unitOf(node) != 0 : !inOnePage(Stream::unit, unitOf(node), units)) {
       sink_.report(Rule::brickUnits, place_, fmt::format("{} units at {}.", units, unitOf(node)));
     }
-    const bool byteTexels = encoding == kEncodingR8 || encoding == kEncodingR16;
-    const bool maskKnown = node.mask == kMaskAll || (node.mask == kMaskTexel && byteTexels) ||
+    const bool maskKnown = node.mask == kMaskAll || (node.mask == kMaskTexel && indexBits(encoding) != 0) ||
                            node.mask < totals_.count[static_cast<std::uint32_t>(Stream::mask)];
     if (!maskKnown) {
       sink_.report(Rule::brickMask, place_, fmt::format("Mask {:#x} with encoding {}.", node.mask, encoding));
@@ -148,7 +147,7 @@ class ItemRules {
   }
 
   void checkNode3Values(const Node3& node, std::uint32_t encoding) {
-    const float high = reconstruct(node.lo, node.scale, encoding == kEncodingR16 ? 65535 : 255);
+    const float high = reconstruct(node.lo, node.scale, largestTexel(encoding));
     const auto values = [&] { return fmt::format("lo {}, scale {}, mean {}.", node.lo, node.scale, node.mean); };
     if (!finite(node.lo) || !finite(node.scale) || !finite(node.mean) || !finite(high)) {
       return sink_.report(Rule::brickFinite, place_, values());

@@ -198,8 +198,8 @@ void checkPageList(const TableView& tables, const GridFrame& frame, const Place&
 
 void checkEmpty(const GridFrame& frame, const Place& place, IssueSink& sink) {
   std::uint64_t sum = frame.activeVoxels | frame.pageListCount;
-  sum |= frame.node4Count | frame.node3Count | frame.maskCount | frame.childCount | frame.tileCount | frame.brickUnits;
-  for (std::uint32_t i = 0; i < kBrickClassCount; ++i) sum |= frame.brickCount[i];
+  sum |= frame.node4Count | frame.node3Count | frame.maskCount | frame.childCount | frame.tileCount;
+  for (std::uint32_t i = 0; i < kBrickClassCount; ++i) sum |= frame.brickCount[i] | frame.brickUnits[i];
   if (sum != 0) sink.report(Rule::gridFrameEmpty, place, "Some of its counts are not zero.");
 }
 
@@ -209,9 +209,8 @@ void checkGridFrame(const TableView& tables, std::uint64_t index, std::uint64_t 
   if ((frame.flags & ~kGridPresent) != 0) {
     sink.report(Rule::gridFrameFlags, place, fmt::format("Its flags are {:#x}.", frame.flags));
   }
-  std::uint32_t reserved = frame.reserved;
-  for (std::uint32_t i = kBrickClassCount; i < kBrickClassSlots; ++i) reserved |= frame.brickCount[i];
-  if (reserved != 0) sink.report(Rule::tableReserved, place, "A reserved field of a grid frame is not.");
+  if ((frame.reserved | frame.reserved2) != 0)
+    sink.report(Rule::tableReserved, place, "A reserved field of a grid frame is not.");
   if (!invertible(frame.indexToWorld)) {
     const bool numbers = std::all_of(std::begin(frame.indexToWorld), std::end(frame.indexToWorld),
                                      [](double value) { return finite(value); });

@@ -221,44 +221,4 @@ TEST(Bc7, randomBlocksOfEveryModeDecodeAsEver) {
   EXPECT_EQ(digest, 1992903762698235123u);
 }
 
-std::array<int, 16> decodeBc4(std::uint32_t a, std::uint32_t b) {
-  // Texel i has palette entry i & 7.
-  std::array<std::byte, 8> block{std::byte(a), std::byte(b)};
-  std::uint64_t indices = 0;
-  for (std::uint32_t i = 0; i < 16; ++i) indices |= std::uint64_t{i & 7} << (3 * i);
-  for (std::uint32_t i = 0; i < 6; ++i) block[2 + i] = static_cast<std::byte>(indices >> (8 * i) & 0xff);
-  std::uint8_t texels[16];
-  decodeBc4Block(block.data(), texels);
-  std::array<int, 16> result;
-  std::copy(texels, texels + 16, result.begin());
-  return result;
-}
-
-TEST(Bc4, eightStepsWhereTheFirstIsLarger) {
-  // 255 - 255 i / 7: 218.57 182.14 145.71 109.29 72.86 36.43
-  const std::array<int, 16> expected{255, 0, 219, 182, 146, 109, 73, 36, 255, 0, 219, 182, 146, 109, 73, 36};
-  EXPECT_EQ(decodeBc4(255, 0), expected);
-}
-
-TEST(Bc4, sixStepsAndTheConstantsOtherwise) {
-  // 10 + 91 i / 5: 28.2 46.4 64.6 82.8
-  const std::array<int, 16> expected{10, 101, 28, 46, 65, 83, 0, 255, 10, 101, 28, 46, 65, 83, 0, 255};
-  EXPECT_EQ(decodeBc4(10, 101), expected);
-  const std::array<int, 16> equalEnds{7, 7, 7, 7, 7, 7, 0, 255, 7, 7, 7, 7, 7, 7, 0, 255};
-  EXPECT_EQ(decodeBc4(7, 7), equalEnds);
-}
-
-TEST(Bc4, everyPairOfEndsRoundsToNearest) {
-  for (int a = 0; a < 256; ++a) {
-    for (int b = 0; b < 256; ++b) {
-      const auto texels = decodeBc4(static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b));
-      const int steps = a > b ? 7 : 5;
-      for (int i = 1; i < steps; ++i) {
-        const int scaled = (steps - i) * a + i * b;
-        EXPECT_LT(std::abs(2 * (texels[static_cast<std::size_t>(i + 1)] * steps - scaled)), steps) << a << ' ' << b;
-      }
-    }
-  }
-}
-
 }  // namespace

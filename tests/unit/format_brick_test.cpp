@@ -1,6 +1,7 @@
 // From stored bytes to values: the order of texels in every encoding, masks, and the reconstruction rule.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -8,9 +9,11 @@
 #include <vector>
 
 #include "billow/format/brick.h"
+#include "sample_pack.h"
 
 namespace {
 
+using namespace billow;
 using namespace billow::format;
 
 Node3 makeNode(std::uint32_t encoding, std::uint32_t mask, float lo = 0, float scale = 1) {
@@ -26,22 +29,6 @@ std::array<std::uint32_t, 3> stored(std::uint32_t encoding, std::uint32_t x, std
       return {x, z, y};
     default:
       return {x, y, z};
-  }
-}
-
-TEST(Brick, bc4VoxelsLieWhereTheSpecSays) {
-  for (const std::uint32_t encoding : {kEncodingBc4Z, kEncodingBc4Y, kEncodingBc4X}) {
-    for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
-      const auto [x, y, z] = stored(encoding, i >> 6, i >> 3 & 7, i & 7);
-      // Ends 0 and 0 with palette entry 7 at one texel: that one is 255, every other 0.
-      std::vector<std::byte> bytes(256);
-      std::byte* block = &bytes[((z * 2 + y / 4) * 2 + x / 4) * 8];
-      const std::uint32_t bit = 16 + 3 * (y % 4 * 4 + x % 4);
-      for (std::uint32_t b = bit; b < bit + 3; ++b) block[b / 8] |= std::byte{1} << b % 8;
-      Texels texels;
-      decodeTexels(encoding, bytes, texels);
-      for (std::uint32_t j = 0; j < kBrickVoxels; ++j) ASSERT_EQ(texels[j], i == j ? 255 : 0) << encoding << ' ' << i;
-    }
   }
 }
 
@@ -67,23 +54,83 @@ TEST(Brick, bc7VoxelsLieWhereTheSpecSays) {
   }
 }
 
-TEST(Brick, rawTexelsHaveXFastest) {
-  std::vector<std::byte> bytes(1024);
-  for (std::uint32_t i = 0; i < 512; ++i) {
-    bytes[i] = static_cast<std::byte>(i & 0xff);
-    bytes[512 + i] = static_cast<std::byte>(i >> 8 | 0x80);
+// By bits of N, lowest first, as the standard puts it: not by decodeIndex.
+std::uint32_t bitsAt(std::span<const std::byte> bytes, std::uint32_t first, std::uint32_t count) {
+  std::uint32_t value = 0;
+  for (std::uint32_t b = 0; b < count; ++b) {
+    value |= (std::to_integer<std::uint32_t>(bytes[(first + b) / 8]) >> (first + b) % 8 & 1u) << b;
   }
-  Texels r8, r16;
-  decodeTexels(kEncodingR8, std::span(bytes).first(512), r8);
-  decodeTexels(kEncodingR16, bytes, r16);
-  for (std::uint32_t x = 0; x < 8; ++x) {
-    for (std::uint32_t y = 0; y < 8; ++y) {
-      for (std::uint32_t z = 0; z < 8; ++z) {
-        const std::uint32_t at = z * 64 + y * 8 + x;
-        EXPECT_EQ(r8[voxelIndex(x, y, z)], at & 0xff);
-        EXPECT_EQ(r16[voxelIndex(x, y, z)], at | 0x8000);
-      }
+  return value;
+}
+
+TEST(Brick, uniformTexelsAreIndicesInVoxelOrder) {
+  for (const std::uint32_t bits : {1u, 2u, 3u, 4u, 5u, 6u, 7u, 8u, 16u}) {
+    const std::vector<std::byte> bytes = tests::randomBytes(64 * bits, bits);
+    Texels texels;
+    decodeTexels(uniformEncoding(bits), bytes, texels);
+    for (std::uint32_t i = 0; i < kBrickVoxels; ++i) ASSERT_EQ(texels[i], bitsAt(bytes, i * bits, bits)) << bits;
+    std::vector<std::byte> packed(bytes.size());
+    packIndices(texels, bits, packed.data());
+    EXPECT_EQ(packed, bytes) << bits;
+  }
+}
+
+TEST(Brick, localTexelsLieBetweenTheEndsOfTheirCell) {
+  for (std::uint32_t bits = 2; bits <= 6; ++bits) {
+    const std::uint32_t last = (1u << bits) - 1;
+    const std::vector<std::byte> bytes = tests::randomBytes(32 + 64 * bits, bits);
+    Texels texels;
+    decodeTexels(localEncoding(bits), bytes, texels);
+    for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
+      const std::uint32_t x = i / 64, y = i / 8 % 8, z = i % 8;
+      const std::uint32_t cell = x / 4 * 8 + y / 4 * 4 + z / 2;
+      const std::uint32_t base = bitsAt(bytes, 16 * cell, 8), top = bitsAt(bytes, 16 * cell + 8, 8);
+      const std::uint32_t index = bitsAt(bytes, 256 + i * bits, bits);
+      ASSERT_EQ(texels[i], base * (last - index) + top * index) << bits << ' ' << i;
+      EXPECT_EQ(decodeIndex(localEncoding(bits), bytes, i), index);
     }
+  }
+}
+
+TEST(Brick, coarseTexelsAreLinearBetweenMiddles) {
+  const std::vector<std::byte> bytes = tests::randomBytes(64, 11);
+  Texels texels;
+  decodeTexels(kEncodingCoarse, bytes, texels);
+  for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
+    const std::uint32_t voxel[] = {i / 64, i / 8 % 8, i % 8};
+    double sum = 0;
+    for (std::uint32_t c = 0; c < 64; ++c) {
+      const std::uint32_t at[] = {c / 16, c / 4 % 4, c % 4};
+      double weight = 1;
+      for (int axis = 0; axis < 3; ++axis) {
+        // Value X stands at 2 X + 0.5; beyond the first and the last it stays.
+        const double place = std::clamp(static_cast<double>(voxel[axis]), 0.5, 6.5);
+        weight *= std::max(0.0, 1 - std::abs(place - (2.0 * at[axis] + 0.5)) / 2);
+      }
+      sum += weight * static_cast<double>(bytes[c]);
+    }
+    ASSERT_EQ(texels[i], 64 * sum) << i;
+  }
+}
+
+TEST(Brick, oneVoxelIsWhatAllAre) {
+  for (std::uint32_t encoding = 0; encoding < kEncodingCount; ++encoding) {
+    const std::vector<std::byte> bytes = tests::randomBytes(*brickBytes(encoding), encoding);
+    Texels texels;
+    decodeTexels(encoding, bytes, texels);
+    for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
+      ASSERT_EQ(decodeTexel(encoding, bytes, i >> 6, i >> 3 & 7, i & 7), texels[i]) << encoding << ' ' << i;
+      ASSERT_LE(texels[i], largestTexel(encoding)) << encoding;
+    }
+  }
+}
+
+TEST(Brick, theLargestTexelIsReached) {
+  for (std::uint32_t encoding = kEncodingUniform1; encoding < kEncodingCount; ++encoding) {
+    const std::vector<std::byte> ones(*brickBytes(encoding), std::byte{255});
+    Texels texels;
+    decodeTexels(encoding, ones, texels);
+    EXPECT_EQ(texels[77], largestTexel(encoding)) << encoding;
   }
 }
 
@@ -104,28 +151,28 @@ TEST(Brick, maskAllNeedsNoMask) {
   const std::vector<std::byte> bytes(512, std::byte{3});
   Values values;
   Mask3 active;
-  decodeBrick(makeNode(kEncodingR8, kMaskAll, 1.0f, 0.5f), nullptr, bytes, -1.0f, values, active);
+  decodeBrick(makeNode(kEncodingUniform8, kMaskAll, 1.0f, 0.5f), nullptr, bytes, -1.0f, values, active);
   for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
     EXPECT_EQ(values[i], 2.5f);
     EXPECT_TRUE(maskBit(active, i));
   }
 }
 
-TEST(Brick, texelMaskIsWhereTheTexelIsNotZero) {
-  std::vector<std::byte> bytes(1024);
-  bytes[5] = std::byte{7};             // x = 5, y = 0, z = 0
-  bytes[512 + 64 * 2] = std::byte{1};  // the high byte alone, of (0, 0, 2)
-  for (const std::uint32_t encoding : {kEncodingR8, kEncodingR16}) {
+TEST(Brick, indexMaskIsWhereTheIndexIsNotZero) {
+  for (std::uint32_t encoding = kEncodingUniform1; encoding <= kEncodingLocal6; ++encoding) {
+    // Ends of 0 in every cell: a texel of 0 does not make a voxel inactive.
+    std::vector<std::byte> bytes(*brickBytes(encoding));
+    const std::uint32_t bits = indexBits(encoding);
+    const std::uint32_t bit = (isLocal(encoding) ? 256 : 0) + voxelIndex(5, 1, 2) * bits + bits - 1;
+    bytes[bit / 8] |= std::byte{1} << bit % 8;
     Values values;
     Mask3 active;
-    decodeBrick(makeNode(encoding, kMaskTexel, 1.0f, 2.0f), nullptr, std::span(bytes).first(*brickBytes(encoding)),
-                -4.0f, values, active);
+    decodeBrick(makeNode(encoding, kMaskTexel, 1.0f, 2.0f), nullptr, bytes, -4.0f, values, active);
     for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
-      float expected = -4.0f;
-      if (i == voxelIndex(5, 0, 0)) expected = 15.0f;
-      if (encoding == kEncodingR16 && i == voxelIndex(0, 0, 2)) expected = 513.0f;
-      EXPECT_EQ(values[i], expected) << encoding << ' ' << i;
-      EXPECT_EQ(maskBit(active, i), expected != -4.0f) << encoding << ' ' << i;
+      const bool on = i == voxelIndex(5, 1, 2);
+      const float texel = isLocal(encoding) ? 0.0f : static_cast<float>(1u << (bits - 1));
+      EXPECT_EQ(values[i], on ? 1.0f + 2.0f * texel : -4.0f) << encoding << ' ' << i;
+      EXPECT_EQ(maskBit(active, i), on) << encoding << ' ' << i;
     }
   }
 }
@@ -136,7 +183,7 @@ TEST(Brick, indexedMaskHidesTexels) {
   mask.words[0] = 2;
   Values values;
   Mask3 active;
-  decodeBrick(makeNode(kEncodingR8, 12345, 0.0f, 1.0f), &mask, bytes, 9.0f, values, active);
+  decodeBrick(makeNode(kEncodingUniform8, 12345, 0.0f, 1.0f), &mask, bytes, 9.0f, values, active);
   EXPECT_EQ(values[0], 9.0f);
   EXPECT_EQ(values[1], 1.0f);
   EXPECT_EQ(values[2], 9.0f);
@@ -156,12 +203,14 @@ TEST(Brick, reconstructRoundsTheProductBeforeTheSum) {
 }
 
 TEST(Brick, sizesAndAxes) {
-  const std::uint32_t bytes[] = {0, 128, 128, 128, 256, 256, 256, 512, 1024};
-  const std::uint32_t axes[] = {2, 2, 1, 0, 2, 1, 0, 2, 2};
+  const std::uint32_t bytes[] = {0,   128, 128,  128, 64,  128, 192, 256, 320, 384,
+                                 448, 512, 1024, 160, 224, 288, 352, 416, 64};
+  const std::uint32_t axes[] = {2, 2, 1, 0};
+  ASSERT_EQ(std::size(bytes), kEncodingCount);
   for (std::uint32_t encoding = 0; encoding < kEncodingCount; ++encoding) {
     EXPECT_EQ(brickBytes(encoding), bytes[encoding]);
-    EXPECT_EQ(brickUnits(encoding), bytes[encoding] / 64);
-    EXPECT_EQ(packedAxis(encoding), axes[encoding]);
+    EXPECT_EQ(brickUnits(encoding), bytes[encoding] / 32);
+    EXPECT_EQ(packedAxis(encoding), encoding < 4 ? axes[encoding] : 2);
   }
   EXPECT_EQ(brickBytes(kEncodingCount), std::nullopt);
   EXPECT_EQ(brickUnits(kEncodingCount), 0u);

@@ -98,7 +98,7 @@ TEST(Pack, AnyPageSizeGivesTheSameContent) {
 TEST(Pack, PageOfFindsClosedAndOpenPages) {
   const TempFolder folder;
   PackWriter::Options options;
-  options.pageBytes = 128;
+  options.pageBytes = 64;
   PackWriter writer(folder / "a.blw", options);
   const std::vector<std::byte> unit(kBrickUnitBytes);
   const std::uint32_t child = 7;
@@ -106,7 +106,7 @@ TEST(Pack, PageOfFindsClosedAndOpenPages) {
     EXPECT_EQ(writer.append(Stream::unit, unit.data(), 1), i);
     EXPECT_EQ(writer.append(Stream::child, &child, 1), i);
   }
-  // 68 bytes each: one pair fills a page to where the next unit does not fit.
+  // 36 bytes each: one pair fills a page to where the next unit does not fit.
   for (std::uint32_t i = 0; i < 7; ++i) {
     EXPECT_EQ(writer.pageOf(Stream::unit, i), i);
     EXPECT_EQ(writer.pageOf(Stream::child, i), i);

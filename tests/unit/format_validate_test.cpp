@@ -302,9 +302,7 @@ TEST(Rules, GridsAndFrames) {
 
 TEST(Rules, GridFrames) {
   expectIssue(215, [](PackImage& i) { i.gridFrames[0].reserved = 1; });
-  for (std::uint32_t c = kBrickClassCount; c < kBrickClassSlots; ++c) {
-    expectIssue(215, [&](PackImage& i) { i.gridFrames[0].brickCount[c] = 1; });
-  }
+  expectIssue(215, [](PackImage& i) { i.gridFrames[0].reserved2 = 1; });
   expectIssue(216, [](PackImage& i) { i.gridFrames[0].flags |= 2; });
   expectIssue(217, [](PackImage& i) { i.gridFrames[0].indexToWorld[5] = 0; });
   expectIssue(217, [](PackImage& i) { i.gridFrames[0].indexToWorld[3] = std::numeric_limits<double>::quiet_NaN(); });
@@ -443,7 +441,7 @@ Node5& root(PackImage& image) {
 Node4& node4(PackImage& image, std::uint32_t index) {
   return *image.item<Node4>(Stream::node4, index);
 }
-// Its Node3s: 0 BC7, 1 BC4, 2 R8, 3 R16, 4 constant.
+// Its Node3s: 0 BC7, 1 coarse, 2 uniform 3, 3 uniform 16, 4 constant, 5 local 4, 6 uniform 8.
 Node3& node3(PackImage& image, std::uint32_t index) {
   return *image.item<Node3>(Stream::node3, index);
 }
@@ -475,7 +473,12 @@ TEST(Rules, Bricks) {
   expectIssue(505, [](PackImage& i) { node3(i, 4).scale = 1; });
   expectIssue(506, [](PackImage& i) { node3(i, 2).mean = -0.5f; });
   expectIssue(506, [](PackImage& i) { node3(i, 0).mean = 1; });
+  expectIssue(503, [](PackImage& i) { node3(i, 4).mask = kMaskTexel; });
   expectIssue(507, [](PackImage& i) { node3(i, 2).brick += 1; });
+  expectIssue(507, [](PackImage& i) {
+    node3(i, 5).brick = node3(i, 0).brick + ((localEncoding(4) - kEncodingBc7Y) << kEncodingShift);
+  });
+  expectIssue(507, [](PackImage& i) { node3(i, 6).brick = kEncodingUniform8 << kEncodingShift | unitOf(node3(i, 3)); });
 }
 
 TEST(Rules, Constants) {
@@ -484,9 +487,9 @@ TEST(Rules, Constants) {
   expectIssue(601, [](PackImage& i) { ++i.gridFrames[0].maskCount; });
   expectIssue(601, [](PackImage& i) { ++i.gridFrames[0].childCount; });
   expectIssue(601, [](PackImage& i) { ++i.gridFrames[0].tileCount; });
-  expectIssue(601, [](PackImage& i) { ++i.gridFrames[0].brickUnits; });
   for (std::uint32_t c = 0; c < kBrickClassCount; ++c) {
     expectIssue(601, [&](PackImage& i) { ++i.gridFrames[0].brickCount[c]; });
+    expectIssue(601, [&](PackImage& i) { ++i.gridFrames[0].brickUnits[c]; });
   }
   expectIssue(602, [](PackImage& i) { ++i.gridFrames[0].activeVoxels; });
   expectIssue(603, [](PackImage& i) { ++i.gridFrames[0].activeMin[0]; });

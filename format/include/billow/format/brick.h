@@ -24,33 +24,69 @@ constexpr std::uint32_t unitOf(const Node3& node) {
   return node.brick & kBrickUnitMask;
 }
 
-// Stored bytes of a brick: 0, 128, 256, 512 or 1024; nullopt for an unknown encoding.
-constexpr std::optional<std::uint32_t> brickBytes(std::uint32_t encoding) {
-  if (encoding == kEncodingConstant) return 0;
-  if (encoding <= kEncodingBc7X) return 128;
-  if (encoding <= kEncodingBc4X) return 256;
-  if (encoding == kEncodingR8) return 512;
-  if (encoding == kEncodingR16) return 1024;
-  return std::nullopt;
+constexpr bool isBc7(std::uint32_t encoding) {
+  return encoding >= kEncodingBc7Z && encoding <= kEncodingBc7X;
+}
+constexpr bool isLocal(std::uint32_t encoding) {
+  return encoding >= kEncodingLocal2 && encoding <= kEncodingLocal6;
 }
 
-// 64-byte units of a stored brick; 0 for a constant and for an unknown encoding.
+// Bits of a voxel's stored index: of uniform and local bricks, which alone have indices; else 0.
+constexpr std::uint32_t indexBits(std::uint32_t encoding) {
+  if (encoding == kEncodingUniform16) return 16;
+  if (encoding >= kEncodingUniform1 && encoding <= kEncodingUniform8) return encoding - kEncodingUniform1 + 1;
+  return isLocal(encoding) ? encoding - kEncodingLocal2 + 2 : 0;
+}
+
+// Uniform of 1 to 8 or 16 bits, local of 2 to 6.
+constexpr std::uint32_t uniformEncoding(std::uint32_t bits) {
+  return bits == 16 ? kEncodingUniform16 : kEncodingUniform1 + bits - 1;
+}
+constexpr std::uint32_t localEncoding(std::uint32_t bits) {
+  return kEncodingLocal2 + bits - 2;
+}
+
+// Bytes of a local brick's cells, before its indices.
+inline constexpr std::uint32_t kLocalCells = 16;
+inline constexpr std::uint32_t kLocalCellBytes = 2 * kLocalCells;
+
+// Cell of a local brick that a voxel lies in: 4x4x2 voxels each.
+constexpr std::uint32_t localCell(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+  return (x >> 2) << 3 | (y >> 2) << 2 | z >> 1;
+}
+
+// Stored bytes of a brick, a multiple of 32 up to 1024; nullopt for an unknown encoding.
+constexpr std::optional<std::uint32_t> brickBytes(std::uint32_t encoding) {
+  if (encoding == kEncodingConstant) return 0;
+  if (isBc7(encoding)) return 128;
+  if (encoding == kEncodingCoarse) return 64;
+  if (encoding >= kEncodingCount) return std::nullopt;
+  return (isLocal(encoding) ? kLocalCellBytes : 0) + kBrickVoxels / 8 * indexBits(encoding);
+}
+
+// 32-byte units of a stored brick; 0 for a constant and for an unknown encoding.
 constexpr std::uint32_t brickUnits(std::uint32_t encoding) {
   return brickBytes(encoding).value_or(0) / kBrickUnitBytes;
 }
 
 // Class of a known encoding other than constant.
 constexpr BrickClass brickClass(std::uint32_t encoding) {
-  if (encoding <= kEncodingBc7X) return BrickClass::bc7;
-  if (encoding <= kEncodingBc4X) return BrickClass::bc4;
-  return encoding == kEncodingR8 ? BrickClass::r8 : BrickClass::r16;
+  if (isBc7(encoding)) return BrickClass::bc7;
+  if (encoding == kEncodingCoarse) return BrickClass::coarse;
+  return isLocal(encoding) ? BrickClass::local : BrickClass::uniform;
+}
+
+// The largest texel that a brick of a known encoding can have; 255 for a constant, whose texels are 0.
+constexpr std::uint32_t largestTexel(std::uint32_t encoding) {
+  if (encoding == kEncodingCoarse) return 64 * 255;
+  const std::uint32_t bits = indexBits(encoding);
+  if (bits == 0) return 255;
+  return ((1u << bits) - 1) * (isLocal(encoding) ? 255 : 1);
 }
 
 // Which axis (0 x, 1 y, 2 z) changes places with z when the brick is stored; 2 where none does.
 constexpr std::uint32_t packedAxis(std::uint32_t encoding) {
-  if (encoding == kEncodingBc7Y || encoding == kEncodingBc4Y) return 1;
-  if (encoding == kEncodingBc7X || encoding == kEncodingBc4X) return 0;
-  return 2;
+  return isBc7(encoding) ? kEncodingBc7X - encoding : 2;
 }
 
 using Texels = std::array<std::uint16_t, kBrickVoxels>;  // by voxelIndex
@@ -58,13 +94,18 @@ using Values = std::array<float, kBrickVoxels>;          // by voxelIndex
 
 // Decodes a stored brick into integer texels. `bytes` must hold brickBytes(encoding); any bytes are valid.
 // BC7: modes 0 to 7 by the Khronos Data Format Specification; the reserved mode gives 0 in all channels.
-// BC4: the interpolated value rounded to the nearest integer of [0, 255] (never half-way).
 void decodeTexels(std::uint32_t encoding, std::span<const std::byte> bytes, Texels& texels);
+// The same for one voxel.
+std::uint32_t decodeTexel(std::uint32_t encoding, std::span<const std::byte> bytes, std::uint32_t x, std::uint32_t y,
+                          std::uint32_t z);
+
+// The stored index of a voxel of a uniform or local brick; `voxel` is its voxelIndex.
+std::uint32_t decodeIndex(std::uint32_t encoding, std::span<const std::byte> bytes, std::uint32_t voxel);
+// The reverse: writes `indices`, by voxelIndex and each below 2^bits, to kBrickVoxels / 8 * bits bytes.
+void packIndices(const Texels& indices, std::uint32_t bits, std::byte* bytes);
 
 // One BC7 block of 16 bytes to 16 RGBA texels (row by row).
 void decodeBc7Block(const std::byte* block, std::uint8_t rgba[16][4]);
-// One BC4 unsigned block of 8 bytes to 16 texels (row by row).
-void decodeBc4Block(const std::byte* block, std::uint8_t texels[16]);
 
 // The reconstruction rule, one rounding a step: float(lo + float(scale * texel)).
 // Compiled without contraction, so that every build and the GPU agree to the bit.

@@ -31,24 +31,26 @@ BILLOW_CONST kNode3SpanLog2 = 3u;   // 8 voxels
 BILLOW_CONST kIndexSpan = 4096u;    // voxels per axis that one grid may span in a frame
 BILLOW_CONST kBrickVoxels = 512u;
 
-// ---- Node3.brick = encoding << kEncodingShift | unit. On disk `unit` is a global index of 64-byte brick units.
+// ---- Node3.brick = encoding << kEncodingShift | unit. On disk `unit` is a global index of 32-byte brick units.
+// A brick's texels are integers; indices of N bits lie one after another in the order of voxel indices.
 BILLOW_CONST kEncodingShift = 27u;
 BILLOW_CONST kBrickUnitMask = 0x07ffffffu;
-BILLOW_CONST kBrickUnitBytes = 64u;
-BILLOW_CONST kEncodingConstant = 0u;  // no brick: every active voxel is `lo`
-BILLOW_CONST kEncodingBc7Z = 1u;      // 8x8x2 RGBA texels, four z values a texel; 128 bytes
-BILLOW_CONST kEncodingBc7Y = 2u;      // the same with y and z exchanged
-BILLOW_CONST kEncodingBc7X = 3u;      // the same with x and z exchanged
-BILLOW_CONST kEncodingBc4Z = 4u;      // 8x8x8 one-channel texels, 4x4 blocks in xy; 256 bytes
-BILLOW_CONST kEncodingBc4Y = 5u;      // the same with y and z exchanged
-BILLOW_CONST kEncodingBc4X = 6u;      // the same with x and z exchanged
-BILLOW_CONST kEncodingR8 = 7u;        // 8x8x8 bytes, x fastest; 512 bytes
-BILLOW_CONST kEncodingR16 = 8u;       // 512 low bytes, then 512 high bytes; 1024 bytes
-BILLOW_CONST kEncodingCount = 9u;
+BILLOW_CONST kBrickUnitBytes = 32u;
+BILLOW_CONST kEncodingConstant = 0u;    // no brick: every active voxel is `lo`
+BILLOW_CONST kEncodingBc7Z = 1u;        // 8x8x2 RGBA texels, four z values a texel; 128 bytes
+BILLOW_CONST kEncodingBc7Y = 2u;        // the same with y and z exchanged
+BILLOW_CONST kEncodingBc7X = 3u;        // the same with x and z exchanged
+BILLOW_CONST kEncodingUniform1 = 4u;    // an index of 1 bit a voxel, which is the texel; 64 bytes
+BILLOW_CONST kEncodingUniform8 = 11u;   // those between have 2 to 7 bits; 64 bytes a bit
+BILLOW_CONST kEncodingUniform16 = 12u;  // 16 bits; 1024 bytes
+BILLOW_CONST kEncodingLocal2 = 13u;  // two ends a cell of 4x4x2 voxels, then indices of 2 bits between them; 160 bytes
+BILLOW_CONST kEncodingLocal6 = 17u;  // those between have 3 to 5 bits; 32 bytes and 64 a bit
+BILLOW_CONST kEncodingCoarse = 18u;  // 4x4x4 bytes, linear between them; 64 bytes
+BILLOW_CONST kEncodingCount = 19u;
 
 // ---- Node3.mask: a global index of 64-byte masks, or one of these.
 BILLOW_CONST kMaskAll = 0xffffffffu;    // every voxel is active
-BILLOW_CONST kMaskTexel = 0xfffffffeu;  // R8 and R16 only: a voxel is active exactly where its texel is not 0
+BILLOW_CONST kMaskTexel = 0xfffffffeu;  // uniform and local only: a voxel is active exactly where its index is not 0
 BILLOW_CONST kMaskIndexLimit = 0x80000000u;
 
 // ---- Node4.flags and Node5.flags
@@ -59,7 +61,8 @@ BILLOW_CONST kNodeTileActive = 1u;
 BILLOW_CONST kNone = 0xffffffffu;
 
 // A brick's header: 8x8x8 voxels. An active voxel's value is lo + scale * texel, in single precision, product rounded
-// before the sum, texel an integer in [0, 255] (R16: [0, 65535]); an inactive voxel's is the grid frame's background.
+// before the sum, texel an integer from 0 to the encoding's largest (brick.h); an inactive voxel's is the grid frame's
+// background.
 // Voxel (x, y, z) is bit z & 31 ... of its mask: bit index x * 64 + y * 8 + z, word index >> 5, bit index & 31.
 struct Node3 {
   BILLOW_U32 brick;
@@ -235,9 +238,8 @@ BILLOW_ASSERT_SIZE(FrameRecord, 16);
 
 inline constexpr std::uint32_t kGridPresent = 1;  // GridFrame.flags: the source frame has this grid
 
-enum class BrickClass : std::uint32_t { bc7 = 0, bc4 = 1, r8 = 2, r16 = 3 };
+enum class BrickClass : std::uint32_t { bc7 = 0, uniform = 1, local = 2, coarse = 3 };
 inline constexpr std::uint32_t kBrickClassCount = 4;
-inline constexpr std::uint32_t kBrickClassSlots = 8;  // those from kBrickClassCount on are reserved
 
 // One grid in one frame: the frame's constants and root.
 struct GridFrame {
@@ -263,8 +265,9 @@ struct GridFrame {
   std::uint32_t maskCount;
   std::uint32_t childCount;  // children of the Node5 and of each distinct Node4, summed
   std::uint32_t tileCount;   // distinct values of active tiles, by their bits; the background is not counted
-  std::uint32_t brickUnits;  // units of all distinct values of Node3.brick, summed
-  std::uint32_t brickCount[kBrickClassSlots];  // distinct values of Node3.brick, by class
+  std::uint32_t brickCount[kBrickClassCount];  // distinct values of Node3.brick, by class
+  std::uint32_t brickUnits[kBrickClassCount];  // units of the same
+  std::uint32_t reserved2;
 };
 BILLOW_ASSERT_SIZE(GridFrame, 248);
 
