@@ -16,7 +16,6 @@ layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer Wor
 
 layout(set = 0, binding = 0, std140) uniform ParamsBlock { MarchParams params; };
 layout(set = 0, binding = 1) uniform texture3D atlasBc7;
-layout(set = 0, binding = 2) uniform texture3D atlasR8;
 
 bool hasGrid(uint slot) { return (kGrids >> slot & 1u) != 0u; }
 

@@ -72,7 +72,7 @@ struct MarchParams {
   vec4 smoke;     // derived smoke: 1 / largest value, rise begin, rise end, share that is left in the hottest part
   vec4 background[2];  // linear RGB at the picture's bottom and top
   uvec4 size;          // width, height, shadow steps at most, jitter (0 or 1)
-  uvec4 atlas;         // log2 of slots along x | along y << 8, for BC7 and R8; address of the BC4 bricks
+  uvec4 bricks;        // log2 of the BC7 atlas's slots along x | along y << 8; 0; address of the slots of 32 bytes
   GridParams grids[3];
 };
 BILLOW_GPU_SIZE(MarchParams, 13 * 16 + 3 * 160);

@@ -10,8 +10,8 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-layout(set = 0, binding = 3, BILLOW_COLOR_FORMAT) writeonly uniform image2D colorImage;
-layout(set = 0, binding = 4, r32f) writeonly uniform image2D depthImage;
+layout(set = 0, binding = 2, BILLOW_COLOR_FORMAT) writeonly uniform image2D colorImage;
+layout(set = 0, binding = 3, r32f) writeonly uniform image2D depthImage;
 
 const float kOpaque = 1.0 / 1024.0;      // transmittance at which a ray ends
 const float kNegligible = 1.0 / 2048.0;  // share of a pixel for which light is not computed anew

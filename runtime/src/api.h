@@ -88,8 +88,7 @@ struct Device {
   std::uint32_t maxImageExtent3D = 0;
   std::uint64_t budget = 0;
   std::uint64_t used = 0;
-  bool bc7 = false;  // bricks stay BC7, in sampled 3D images; else they are decoded to R8
-  bool bc4 = false;  // bricks stay BC4, in a buffer
+  bool bc7 = false;  // BC7 bricks stay BC7, in a sampled 3D image; else they are decoded to uniform bricks of 8 bits
 };
 
 tl::unexpected<Error> vulkanError(const char* call, VkResult result);

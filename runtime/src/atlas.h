@@ -1,4 +1,4 @@
-// Atlases: 3D images whose slots hold a brick each, 8x8x2 texels of BC7 or 8x8x8 of R8.
+// The atlas: a 3D image of BC7 whose slots hold a brick each, 8x8x2 texels.
 #ifndef BILLOW_RUNTIME_ATLAS_H
 #define BILLOW_RUNTIME_ATLAS_H
 
@@ -11,9 +11,9 @@
 
 namespace billow::runtime {
 
-// Slots along x and y are powers of two, so that a shader finds a slot by shifts.
+// Slots along x and y are powers of two, so that a shader finds a slot by shifts. Without slots the image is one texel
+// of R8, for a descriptor must be valid though nothing is read through it.
 struct AtlasShape {
-  BrickStore which = BrickStore::r8;
   std::uint32_t xBits = 0;
   std::uint32_t yBits = 0;
   std::uint32_t layers = 0;  // slots along z
@@ -23,11 +23,10 @@ struct AtlasShape {
   std::uint64_t bytes() const;
 };
 
-// The smallest shape near a cube for `slots` >= 1 slots; nullopt where none fits into maxExtent texels an axis.
-std::optional<AtlasShape> atlasShape(BrickStore which, std::uint32_t slots, std::uint32_t maxExtent);
+// The smallest shape near a cube for so many slots; nullopt where none fits into maxExtent texels an axis.
+std::optional<AtlasShape> atlasShape(std::uint32_t slots, std::uint32_t maxExtent);
 
-// Copies a brick into its slot of the image's bytes (tightly packed, as a buffer-to-image copy reads them). Bricks that
-// are blocks in an R8 atlas are decoded.
+// Copies a BC7 brick into its slot of the image's bytes (tightly packed, as a buffer-to-image copy reads them).
 void writeSlot(const AtlasShape& shape, const StoredBrick& brick, std::span<std::byte> image);
 
 }  // namespace billow::runtime

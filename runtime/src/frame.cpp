@@ -7,7 +7,8 @@
 namespace billow::runtime {
 namespace {
 
-constexpr std::uint64_t kSectionAlign = 16;
+// A slot of 32 bytes never lies in two sectors of a cache.
+constexpr std::uint64_t kSectionAlign = format::kBrickUnitBytes;
 
 std::uint64_t aligned(std::uint64_t bytes) {
   return (bytes + kSectionAlign - 1) / kSectionAlign * kSectionAlign;
@@ -40,25 +41,22 @@ Result<void> stageGrid(StagedFrame& staged, std::uint32_t slot, const format::Pa
   return {};
 }
 
-std::uint64_t blockBytes(const StagedFrame& staged) {
-  return std::uint64_t{staged.slots.slots(BrickStore::bc4)} *
-         kStoreSlotBytes[static_cast<std::size_t>(BrickStore::bc4)];
+std::uint64_t bufferBrickBytes(const StagedFrame& staged) {
+  return staged.slots.bufferSlots() * format::kBrickUnitBytes;
 }
 
-Result<void> shapeAtlases(StagedFrame& staged, std::uint32_t maxExtent) {
-  for (std::uint32_t i = 0; i < kAtlasCount; ++i) {
-    const BrickStore which = static_cast<BrickStore>(i);
-    if (staged.slots.slots(which) == 0) continue;
-    staged.shapes[i] = atlasShape(which, staged.slots.slots(which), maxExtent);
-    if (!staged.shapes[i]) {
-      return failure(ErrorCode::unsupported, "the frame has more bricks than the device's largest 3D image holds");
-    }
+Result<void> placeBricks(StagedFrame& staged, std::uint32_t maxExtent) {
+  if (staged.slots.bufferSlots() > format::kBrickUnitMask) {
+    return failure(ErrorCode::unsupported, "the frame has more than 4 GiB of bricks");
   }
-  staged.bufferBytes += blockBytes(staged);
-  // Descriptors must be valid, so a frame without atlas bricks still has one atlas.
-  if (!staged.shapes[0] && !staged.shapes[1]) {
-    staged.shapes[1] = AtlasShape{.which = BrickStore::r8, .xBits = 0, .yBits = 0, .layers = 1};
+  staged.bufferBytes += bufferBrickBytes(staged);
+  const auto atlasBricks = static_cast<std::uint32_t>(staged.slots.inAtlas().size());
+  if (atlasBricks == 0) return {};
+  const auto shape = atlasShape(atlasBricks, maxExtent);
+  if (!shape) {
+    return failure(ErrorCode::unsupported, "the frame has more bricks than the device's largest 3D image holds");
   }
+  staged.shape = *shape;
   return {};
 }
 
@@ -69,12 +67,9 @@ void countBytes(const StagedFrame& staged, FrameStats& stats) {
     stats.recordBytes += grid->records.size() * sizeof(GpuRecord);
     stats.maskBytes += grid->masks.size() * sizeof(format::Mask3);
   }
-  stats.bc7Bricks = staged.slots.slots(BrickStore::bc7);
-  stats.bc4Bricks = staged.slots.slots(BrickStore::bc4);
-  stats.r8Slots = staged.slots.slots(BrickStore::r8);
-  for (std::uint32_t i = 0; i < kStoreCount; ++i) {
-    stats.brickBytes += std::uint64_t{staged.slots.slots(static_cast<BrickStore>(i))} * kStoreSlotBytes[i];
-  }
+  stats.bc7Bricks = static_cast<std::uint32_t>(staged.slots.inAtlas().size());
+  stats.bufferBricks = static_cast<std::uint32_t>(staged.slots.inBuffer().size());
+  stats.brickBytes = bufferBrickBytes(staged) + std::uint64_t{stats.bc7Bricks} * kAtlasSlotBytes;
 }
 
 ResidentGrid describe(const GpuGrid& grid, VkDeviceAddress& at) {
@@ -97,7 +92,8 @@ ResidentGrid describe(const GpuGrid& grid, VkDeviceAddress& at) {
 void fillStaging(const StagedFrame& staged, const FrameObjects& objects) {
   const std::span<std::byte> bytes = objects.staging.mapped();
   std::fill(bytes.begin(), bytes.end(), std::byte{0});
-  std::uint64_t at = 0;
+  for (const StoredBrick& brick : staged.slots.inBuffer()) writeBrick(brick, bytes);
+  std::uint64_t at = bufferBrickBytes(staged);
   for (const auto& grid : staged.grids) {
     if (!grid) continue;
     for (const auto section : sectionsOf(*grid)) {
@@ -105,17 +101,8 @@ void fillStaging(const StagedFrame& staged, const FrameObjects& objects) {
       at += aligned(section.size());
     }
   }
-  for (const StoredBrick& brick : staged.slots.bricks(BrickStore::bc4)) {
-    std::memcpy(bytes.subspan(at + std::uint64_t{brick.slot} * brick.bytes.size(), brick.bytes.size()).data(),
-                brick.bytes.data(), brick.bytes.size());
-  }
-  for (std::uint32_t i = 0; i < kAtlasCount; ++i) {
-    if (!staged.shapes[i]) continue;
-    const std::span<std::byte> image = bytes.subspan(objects.offsets[i], staged.shapes[i]->bytes());
-    for (const StoredBrick& brick : staged.slots.bricks(static_cast<BrickStore>(i))) {
-      writeSlot(*staged.shapes[i], brick, image);
-    }
-  }
+  const std::span<std::byte> image = bytes.subspan(objects.atlasOffset, staged.shape.bytes());
+  for (const StoredBrick& brick : staged.slots.inAtlas()) writeSlot(staged.shape, brick, image);
 }
 
 Result<void> createObjects(Device& device, const StagedFrame& staged, FrameObjects& objects) {
@@ -128,18 +115,13 @@ Result<void> createObjects(Device& device, const StagedFrame& staged, FrameObjec
   frame.buffer_ = std::move(*buffer);
   frame.bufferBytes_ = staged.bufferBytes;
   frame.stats_.allocatedBytes = frame.buffer_.allocationSize();
-  std::uint64_t stagingBytes = aligned(bufferBytes);
-  for (std::uint32_t i = 0; i < kAtlasCount; ++i) {
-    if (!staged.shapes[i]) continue;
-    frame.shapes_[i] = *staged.shapes[i];
-    objects.offsets[i] = stagingBytes;
-    stagingBytes += aligned(staged.shapes[i]->bytes());
-    auto image = Image3D::make(device, staged.shapes[i]->format(), staged.shapes[i]->extent());
-    if (!image) return tl::unexpected(image.error());
-    frame.atlases_[i] = std::move(*image);
-    frame.stats_.allocatedBytes += frame.atlases_[i].allocationSize();
-  }
-  auto staging = Buffer::make(device, stagingBytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
+  frame.shape_ = staged.shape;
+  auto image = Image3D::make(device, staged.shape.format(), staged.shape.extent());
+  if (!image) return tl::unexpected(image.error());
+  frame.atlas_ = std::move(*image);
+  frame.stats_.allocatedBytes += frame.atlas_.allocationSize();
+  objects.atlasOffset = aligned(bufferBytes);
+  auto staging = Buffer::make(device, objects.atlasOffset + staged.shape.bytes(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
   if (!staging) return tl::unexpected(staging.error());
   objects.staging = std::move(*staging);
   return {};
@@ -156,10 +138,7 @@ Result<void> checkBudget(const Device& device, const FrameObjects& objects) {
 
 Result<void> bindObjects(FrameObjects& objects) {
   if (auto bound = objects.frame->buffer_.bind(Placement::device); !bound) return bound;
-  for (Image3D& atlas : objects.frame->atlases_) {
-    if (atlas.handle() == VK_NULL_HANDLE) continue;
-    if (auto bound = atlas.bind(); !bound) return bound;
-  }
+  if (auto bound = objects.frame->atlas_.bind(); !bound) return bound;
   return objects.staging.bind(Placement::mapped);
 }
 
@@ -210,8 +189,7 @@ Result<StagedFrame> stageFrame(const Device& device, const format::Pack& pack, s
   if (frame >= record.frameCount) return failure(ErrorCode::argument, "the volume has no such frame");
   const auto numbers = slotNumbers(pack, record, options);
   if (!numbers) return tl::unexpected(numbers.error());
-  StagedFrame staged{
-      .views = {}, .grids = {}, .shapes = {}, .slots = BrickSlots(device.bc7, device.bc4), .bufferBytes = 0};
+  StagedFrame staged{.views = {}, .grids = {}, .shape = {}, .slots = BrickSlots(device.bc7), .bufferBytes = 0};
   // Views must not move while bricks and masks are read from them.
   staged.views.reserve(gpu::kGridSlots);
   for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
@@ -220,8 +198,8 @@ Result<StagedFrame> stageFrame(const Device& device, const format::Pack& pack, s
     const auto done = stageGrid(staged, slot, pack, pack.gridFrame(record, frame, number), options.index);
     if (!done) return tl::unexpected(done.error());
   }
-  const auto shaped = shapeAtlases(staged, device.maxImageExtent3D);
-  if (!shaped) return tl::unexpected(shaped.error());
+  const auto placed = placeBricks(staged, device.maxImageExtent3D);
+  if (!placed) return tl::unexpected(placed.error());
   return staged;
 }
 
@@ -232,11 +210,11 @@ Result<FrameObjects> makeFrameObjects(Device& device, const StagedFrame& staged)
   if (auto made = createObjects(device, staged, objects); !made) return tl::unexpected(made.error());
   if (auto fits = checkBudget(device, objects); !fits) return tl::unexpected(fits.error());
   if (auto bound = bindObjects(objects); !bound) return tl::unexpected(bound.error());
-  VkDeviceAddress at = objects.frame->buffer_.address();
+  objects.frame->bricks_ = objects.frame->buffer_.address();
+  VkDeviceAddress at = objects.frame->bricks_ + bufferBrickBytes(staged);
   for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
     if (staged.grids[slot]) objects.frame->grids_[slot] = describe(*staged.grids[slot], at);
   }
-  objects.frame->blocks_ = at;
   fillStaging(staged, objects);
   return objects;
 }

@@ -37,18 +37,20 @@ class ResidentFrame final : public Frame {
   FrameStats stats_;
   std::uint64_t uploadValue_ = 0;
   std::array<ResidentGrid, gpu::kGridSlots> grids_;
-  Buffer buffer_;                  // tables, records, masks of all grids, then BC4 bricks
+  // Bricks that are not BC7, then tables, records and masks of all grids: a shader that reads a word past the last
+  // brick stays inside.
+  Buffer buffer_;
   std::uint64_t bufferBytes_ = 0;  // of it that are copied from staging
-  std::array<Image3D, kAtlasCount> atlases_;
-  std::array<AtlasShape, kAtlasCount> shapes_;
-  VkDeviceAddress blocks_ = 0;  // BC4 bricks, in buffer_
+  VkDeviceAddress bricks_ = 0;     // where buffer_ begins
+  Image3D atlas_;
+  AtlasShape shape_;
 };
 
 // A frame on the CPU: what will be copied, with the views that its bricks point into.
 struct StagedFrame {
   std::vector<format::GridView> views;
   std::array<std::optional<GpuGrid>, gpu::kGridSlots> grids;
-  std::array<std::optional<AtlasShape>, kAtlasCount> shapes;
+  AtlasShape shape;
   BrickSlots slots;
   std::uint64_t bufferBytes = 0;
 };
@@ -62,11 +64,11 @@ Result<StagedFrame> stageFrame(const Device& device, const format::Pack& pack, s
                                std::uint32_t frame, const UploadOptions& options);
 
 // Creates the frame's objects and its staging buffer, checks them against the budget, then allocates and fills the
-// staging memory. `offsets` receives where each atlas begins in it; the buffer's bytes are at 0.
+// staging memory: the buffer's bytes, and from `atlasOffset` on the atlas's.
 struct FrameObjects {
   std::unique_ptr<ResidentFrame> frame;
   Buffer staging;
-  std::array<std::uint64_t, kAtlasCount> offsets{};
+  std::uint64_t atlasOffset = 0;
 };
 Result<FrameObjects> makeFrameObjects(Device& device, const StagedFrame& staged);
 

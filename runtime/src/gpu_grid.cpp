@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 #include <map>
 
 #include "gpu_index.h"
@@ -105,24 +106,33 @@ Index chooseIndex(const format::GridFrame& frame, Index wanted) {
   return format::gpuBytes(frame).index == format::GpuIndex::flat ? Index::flat : Index::tree;
 }
 
-BrickStore storeOf(std::uint32_t encoding) {
-  if (encoding <= format::kEncodingBc7X) return BrickStore::bc7;
-  return encoding <= format::kEncodingBc4X ? BrickStore::bc4 : BrickStore::r8;
-}
-
 std::uint32_t BrickSlots::place(const GridView::Leaf& leaf) {
   const std::uint32_t encoding = format::encodingOf(leaf.node);
   if (encoding == format::kEncodingConstant) return 0;
   const auto [entry, fresh] = placed_.try_emplace(leaf.node.brick, 0);
   if (!fresh) return entry->second;
-  const BrickStore own = storeOf(encoding);
-  const bool decoded = (own == BrickStore::bc7 && !bc7_) || (own == BrickStore::bc4 && !bc4_);
-  const std::uint32_t stored = decoded ? format::kEncodingR8 : encoding;
-  const std::uint32_t which = static_cast<std::uint32_t>(storeOf(stored));
-  bricks_[which].push_back({leaf.brick, encoding, slots_[which]});
-  entry->second = stored << format::kEncodingShift | slots_[which];
-  slots_[which] += stored == format::kEncodingR16 ? 2 : 1;
-  return entry->second;
+  const bool bc7 = format::brickClass(encoding) == format::BrickClass::bc7;
+  if (bc7 && bc7_) {
+    const auto slot = static_cast<std::uint32_t>(inAtlas_.size());
+    inAtlas_.push_back({leaf.brick, encoding, slot});
+    return entry->second = encoding << format::kEncodingShift | slot;
+  }
+  const auto slot = static_cast<std::uint32_t>(bufferSlots_ & format::kBrickUnitMask);
+  inBuffer_.push_back({leaf.brick, encoding, slot});
+  const std::uint32_t stored = bc7 ? format::kEncodingUniform8 : encoding;
+  bufferSlots_ += format::brickUnits(stored);
+  return entry->second = stored << format::kEncodingShift | slot;
+}
+
+void writeBrick(const StoredBrick& brick, std::span<std::byte> buffer) {
+  std::byte* const place = &buffer[std::size_t{brick.slot} * format::kBrickUnitBytes];
+  if (format::brickClass(brick.encoding) != format::BrickClass::bc7) {
+    std::memcpy(place, brick.bytes.data(), brick.bytes.size());
+    return;
+  }
+  format::Texels texels;
+  format::decodeTexels(brick.encoding, brick.bytes, texels);
+  for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) place[i] = static_cast<std::byte>(texels[i]);
 }
 
 GpuGrid buildGpuGrid(const GridView& view, Index wanted, BrickSlots& slots) {

@@ -13,39 +13,40 @@
 
 namespace billow::runtime {
 
-// Where bricks lie on the GPU: BC7 and R8 in atlases, BC4 in a buffer whose blocks the shader decodes, for devices
-// differ by up to three steps of 255 in what their samplers make of BC4.
-enum class BrickStore : std::uint32_t { bc7 = 0, r8 = 1, bc4 = 2 };
-inline constexpr std::uint32_t kStoreCount = 3;
-inline constexpr std::uint32_t kAtlasCount = 2;  // the first ones
-inline constexpr std::uint32_t kStoreSlotBytes[kStoreCount] = {128, 512, 256};
-
-BrickStore storeOf(std::uint32_t encoding);
+inline constexpr std::uint32_t kAtlasSlotBytes = 128;
 
 struct StoredBrick {
   std::span<const std::byte> bytes;  // in the pack's encoding; lives as long as its GridView
   std::uint32_t encoding;
-  std::uint32_t slot;
+  std::uint32_t slot;  // the first one
 };
 
-// Gives bricks slots; what is equal in the pack (same unit) gets one slot, whichever grid asks.
+// Gives bricks slots; what is equal in the pack (same brick word) gets one place, whichever grid asks. BC7 bricks lie
+// in the atlas, one a slot. All others lie in a buffer as they lie on disk, one after another, whose slots are units of
+// kBrickUnitBytes; the shader decodes them. Where the device does not take BC7, such bricks are decoded to eight bits a
+// voxel and lie there too.
 class BrickSlots {
  public:
-  // Bricks of a kind that the device does not take are decoded to R8.
-  BrickSlots(bool bc7, bool bc4) : bc7_(bc7), bc4_(bc4) {}
+  explicit BrickSlots(bool bc7) : bc7_(bc7) {}
 
   // The record's brick word: encoding on the GPU << kEncodingShift | slot.
   std::uint32_t place(const format::GridView::Leaf& leaf);
 
-  std::span<const StoredBrick> bricks(BrickStore which) const { return bricks_[static_cast<std::uint32_t>(which)]; }
-  std::uint32_t slots(BrickStore which) const { return slots_[static_cast<std::uint32_t>(which)]; }
+  std::span<const StoredBrick> inAtlas() const { return inAtlas_; }
+  std::span<const StoredBrick> inBuffer() const { return inBuffer_; }
+  // Slots of the buffer. Only where they are at most kBrickUnitMask are the words right that place() gave.
+  std::uint64_t bufferSlots() const { return bufferSlots_; }
 
  private:
-  bool bc7_, bc4_;
-  std::vector<StoredBrick> bricks_[kStoreCount];
-  std::uint32_t slots_[kStoreCount] = {};
+  bool bc7_;
+  std::vector<StoredBrick> inAtlas_;
+  std::vector<StoredBrick> inBuffer_;
+  std::uint64_t bufferSlots_ = 0;
   std::unordered_map<std::uint32_t, std::uint32_t> placed_;  // the pack's brick word -> ours
 };
+
+// Writes a brick of the buffer, as it lies on disk or decoded, at its slot of the buffer's bytes.
+void writeBrick(const StoredBrick& brick, std::span<std::byte> buffer);
 
 // What the GPU reads of a Node3 or of an active tile, in one load. An inactive voxel's value is the grid's background.
 struct GpuRecord {

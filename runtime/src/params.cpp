@@ -24,10 +24,8 @@ gpu::uvec4 addresses(VkDeviceAddress a, VkDeviceAddress b) {
 }
 
 void addFrame(const ResidentFrame& frame, const std::array<double, 3>& eye, Filter widest, gpu::MarchParams& params) {
-  std::uint32_t shifts[kAtlasCount];
-  for (std::uint32_t i = 0; i < kAtlasCount; ++i) shifts[i] = frame.shapes_[i].xBits | frame.shapes_[i].yBits << 8;
-  const gpu::uvec4 blocks = addresses(frame.blocks_, 0);
-  params.atlas = {shifts[0], shifts[1], blocks.x, blocks.y};
+  params.bricks = addresses(0, frame.bricks_);
+  params.bricks.x = frame.shape_.xBits | frame.shape_.yBits << 8;
   for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
     if (frame.grids_[slot].present) params.grids[slot] = gridParams(frame.grids_[slot], eye, widest);
   }

@@ -12,11 +12,12 @@ namespace {
 // At least as large as any device's uniform buffer alignment.
 constexpr std::uint64_t kParamsStride = (sizeof(gpu::MarchParams) + 255) / 256 * 256;
 constexpr std::uint32_t kPushBytes = 24;  // voxels.comp
-constexpr std::uint32_t kBindings = 5;
+constexpr std::uint32_t kAtlasBinding = 1;
+constexpr std::uint32_t kBindings = 4;
 
 VkDescriptorType bindingType(std::uint32_t binding) {
   if (binding == 0) return VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
-  return binding <= kAtlasCount ? VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE : VK_DESCRIPTOR_TYPE_STORAGE_IMAGE;
+  return binding == kAtlasBinding ? VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE : VK_DESCRIPTOR_TYPE_STORAGE_IMAGE;
 }
 
 std::span<const std::uint32_t> spirvOf(Shader shader) {
@@ -81,7 +82,7 @@ Result<void> Passes::createLayouts() {
 
 Result<void> Passes::createSets() {
   const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, inFlight_},
-                                        {VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE, kAtlasCount * inFlight_},
+                                        {VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE, inFlight_},
                                         {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, 2 * inFlight_}};
   auto poolInfo = begin<VkDescriptorPoolCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO);
   poolInfo.maxSets = inFlight_;
@@ -142,22 +143,14 @@ void Passes::bind(VkCommandBuffer commands, const ResidentFrame& frame, const gp
   next_ = (next_ + 1) % inFlight_;
   std::memcpy(params_.mapped().subspan(offset, sizeof(params)).data(), &params, sizeof(params));
   const VkDescriptorBufferInfo bufferInfo{params_.handle(), offset, sizeof(params)};
-  VkImageView views[kBindings] = {};
-  VkImageView anyAtlas = VK_NULL_HANDLE;
-  for (const Image3D& atlas : frame.atlases_) {
-    if (atlas.view() != VK_NULL_HANDLE) anyAtlas = atlas.view();
-  }
-  for (std::uint32_t i = 0; i < kAtlasCount; ++i) {
-    views[1 + i] = frame.atlases_[i].view() != VK_NULL_HANDLE ? frame.atlases_[i].view() : anyAtlas;
-  }
-  views[3] = color;
-  views[4] = depth;
+  const VkImageView views[kBindings] = {VK_NULL_HANDLE, frame.atlas_.view(), color, depth};
   std::array<VkDescriptorImageInfo, kBindings> images{};
   std::array<VkWriteDescriptorSet, kBindings> writes{};
   std::uint32_t count = 0;
   for (std::uint32_t i = 0; i < kBindings; ++i) {
     if (i != 0 && views[i] == VK_NULL_HANDLE) continue;
-    const VkImageLayout layout = i <= kAtlasCount ? VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL : VK_IMAGE_LAYOUT_GENERAL;
+    const VkImageLayout layout =
+        i == kAtlasBinding ? VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL : VK_IMAGE_LAYOUT_GENERAL;
     images[i] = {VK_NULL_HANDLE, views[i], layout};
     VkWriteDescriptorSet& write = writes[count++];
     write = begin<VkWriteDescriptorSet>(VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET);

@@ -35,10 +35,9 @@ Result<void> describeDevice(Device& device, BlockUse use) {
   device.maxImageExtent3D = properties.properties.limits.maxImageDimension3D;
   device.api.vkGetPhysicalDeviceMemoryProperties(device.host.physicalDevice, &device.memory);
   device.bc7 = device.host.textureCompressionBc && sampled3D(device, VK_FORMAT_BC7_UNORM_BLOCK);
-  device.bc4 = true;
-  // In software a block is decoded anew for each texel that is read: six times as slow as R8.
+  // In software a block is decoded anew for each texel that is read, which takes several times as long.
   const bool software = properties.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
-  if (use == BlockUse::decoded || (use == BlockUse::automatic && software)) device.bc7 = device.bc4 = false;
+  if (use == BlockUse::decoded || (use == BlockUse::automatic && software)) device.bc7 = false;
   return {};
 }
 

@@ -23,15 +23,12 @@ VkImageMemoryBarrier2 layoutBarrier(const Image3D& image, VkImageLayout from, Vk
   return barrier;
 }
 
-void changeLayouts(const Api& api, VkCommandBuffer commands, const ResidentFrame& frame, VkImageLayout from,
-                   VkImageLayout to) {
-  std::vector<VkImageMemoryBarrier2> barriers;
-  for (const Image3D& atlas : frame.atlases_) {
-    if (atlas.handle() != VK_NULL_HANDLE) barriers.push_back(layoutBarrier(atlas, from, to));
-  }
+void changeLayout(const Api& api, VkCommandBuffer commands, const ResidentFrame& frame, VkImageLayout from,
+                  VkImageLayout to) {
+  const VkImageMemoryBarrier2 barrier = layoutBarrier(frame.atlas_, from, to);
   auto info = begin<VkDependencyInfo>(VK_STRUCTURE_TYPE_DEPENDENCY_INFO);
-  info.imageMemoryBarrierCount = static_cast<std::uint32_t>(barriers.size());
-  info.pImageMemoryBarriers = barriers.data();
+  info.imageMemoryBarrierCount = 1;
+  info.pImageMemoryBarriers = &barrier;
   api.vkCmdPipelineBarrier2(commands, &info);
 }
 
@@ -41,15 +38,12 @@ void copyAll(const Api& api, VkCommandBuffer commands, const FrameObjects& objec
     const VkBufferCopy whole{0, 0, bufferBytes};
     api.vkCmdCopyBuffer(commands, objects.staging.handle(), frame.buffer_.handle(), 1, &whole);
   }
-  for (std::uint32_t i = 0; i < kAtlasCount; ++i) {
-    if (frame.atlases_[i].handle() == VK_NULL_HANDLE) continue;
-    VkBufferImageCopy copy{};
-    copy.bufferOffset = objects.offsets[i];
-    copy.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
-    copy.imageExtent = frame.atlases_[i].extent();
-    api.vkCmdCopyBufferToImage(commands, objects.staging.handle(), frame.atlases_[i].handle(),
-                               VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &copy);
-  }
+  VkBufferImageCopy copy{};
+  copy.bufferOffset = objects.atlasOffset;
+  copy.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
+  copy.imageExtent = frame.atlas_.extent();
+  api.vkCmdCopyBufferToImage(commands, objects.staging.handle(), frame.atlas_.handle(),
+                             VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &copy);
 }
 
 }  // namespace
@@ -91,10 +85,10 @@ Result<void> Uploads::record(VkCommandBuffer commands, const FrameObjects& objec
   VkResult result = device_.api.vkBeginCommandBuffer(commands, &beginInfo);
   if (result != VK_SUCCESS) return vulkanError("vkBeginCommandBuffer", result);
   const ResidentFrame& frame = *objects.frame;
-  changeLayouts(device_.api, commands, frame, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
+  changeLayout(device_.api, commands, frame, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
   copyAll(device_.api, commands, objects, frame.bufferBytes_);
-  changeLayouts(device_.api, commands, frame, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
-                VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
+  changeLayout(device_.api, commands, frame, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+               VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
   result = device_.api.vkEndCommandBuffer(commands);
   if (result != VK_SUCCESS) return vulkanError("vkEndCommandBuffer", result);
   return {};

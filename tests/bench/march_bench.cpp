@@ -119,7 +119,7 @@ void measure(headless::Headless& gpu, const format::Pack& pack, const Options& o
     const double milliseconds = median(valueOf(gpu.time(*renderer, draw, options.draws)));
     const runtime::FrameStats& stats = frame->stats();
     fmt::print("{:<6} {:<5} {:<10} {:<10} {:>9.3f} {:>10.1f} {:>10.1f} {:>10.1f} {:>10.1f} {:>10.1f}\n",
-               blocks == runtime::BlockUse::decoded ? "R8" : "blocks", nameOf(variant.index), nameOf(variant.filter),
+               blocks == runtime::BlockUse::decoded ? "u8" : "blocks", nameOf(variant.index), nameOf(variant.filter),
                nameOf(variant.shadows), milliseconds, static_cast<double>(stats.indexBytes) / 1e3,
                static_cast<double>(stats.recordBytes) / 1e3, static_cast<double>(stats.maskBytes) / 1e3,
                static_cast<double>(stats.brickBytes) / 1e3, static_cast<double>(stats.allocatedBytes) / 1e3);

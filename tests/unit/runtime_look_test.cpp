@@ -20,8 +20,8 @@ std::vector<std::byte> cloud(const std::vector<std::string>& grids, float value,
       }
       GridFrameBuilder grid(writer, 0);
       for (std::uint32_t i = 0; i < 64; ++i) {
-        grid.brick({20 + i / 16, 20 + i / 4 % 4, 20 + i % 4}, format::kEncodingR8, randomBytes(512, i), 0, value / 255,
-                   format::kMaskAll);
+        grid.brick({20 + i / 16, 20 + i / 4 % 4, 20 + i % 4}, format::kEncodingUniform8, randomBytes(512, i), 0,
+                   value / 255, format::kMaskAll);
       }
       tables.gridFrames.push_back(grid.finish(tables));
       for (double& entry : tables.gridFrames.back().indexToWorld) entry *= world;

@@ -1,4 +1,4 @@
-// The GPU's getVoxel gives the same bits as the CPU's, for every encoding, index and atlas; trilinear reads are what
+// The GPU's getVoxel gives the same bits as the CPU's, for every encoding, mask and index; trilinear reads are what
 // the eight voxels around make of them.
 #include <gtest/gtest.h>
 
@@ -24,23 +24,23 @@ format::Mask3 someMask(std::uint32_t seed) {
   return mask;
 }
 
-// Every encoding beside every other, all kinds of masks, bricks at the edges of nodes, and a tile.
-std::vector<std::byte> everything() {
-  return oneGridPack(0.0625f, [](GridFrameBuilder& grid) {
+// Every encoding beside every other, each with all kinds of masks it may have, bricks at the edges of nodes, and a
+// tile. Where `integers` are asked for, every value is one.
+std::vector<std::byte> everything(bool integers = false) {
+  return oneGridPack(integers ? 16 : 0.0625f, [&](GridFrameBuilder& grid) {
     using namespace format;
+    const float lo = integers ? -7 : -0.7f;
     for (std::uint32_t encoding = 0; encoding < kEncodingCount; ++encoding) {
-      const std::uint32_t bytes = *brickBytes(encoding);
-      float scale = 0.003f + 0.01f * static_cast<float>(encoding);
+      const auto bytes = [&](std::uint32_t seed) { return randomBytes(*brickBytes(encoding), seed + encoding); };
+      const float largest = static_cast<float>(largestTexel(encoding));
+      float scale = integers ? 1 : (0.8f + 0.1f * static_cast<float>(encoding)) / largest;
       if (encoding == kEncodingConstant) scale = 0;
-      if (encoding == kEncodingR16) scale = 0.0003f;
-      grid.brick({14 + encoding / 3, 15 + encoding % 3, 16}, encoding, randomBytes(bytes, encoding), -0.7f, scale,
-                 kMaskAll);
-      grid.brick({14 + encoding / 3, 15 + encoding % 3, 17}, encoding, randomBytes(bytes, 90 + encoding), 0.3f, scale,
-                 0, someMask(encoding));
+      const std::uint32_t x = 15 + encoding / 5, y = 15 + encoding % 5;
+      grid.brick({x, y, 16}, encoding, bytes(0), lo, scale, kMaskAll);
+      grid.brick({x, y, 17}, encoding, bytes(90), lo + 1, scale, 0, someMask(encoding));
+      if (indexBits(encoding) != 0) grid.brick({x, y, 15}, encoding, bytes(40), lo + 2, scale, kMaskTexel);
     }
-    grid.brick({14, 14, 14}, kEncodingR8, randomBytes(512, 40), 1, 0.07f, kMaskTexel);
-    grid.brick({14, 14, 15}, kEncodingR16, randomBytes(1024, 41), 1, 0.0007f, kMaskTexel);
-    grid.tile({1, 0, 0}, 2.5f);
+    grid.tile({0, 0, 0}, 2);
   });
 }
 
@@ -121,23 +121,48 @@ TEST_P(Lookup, NearestIsTheSameToTheBit) {
   EXPECT_EQ(wrong, 0u) << "of " << values->size();
 }
 
+// Positions in and around all bricks of everything(), multiples of 1 / steps.
+std::vector<float> randomPositions(std::uint32_t steps) {
+  constexpr std::uint32_t kLow[3] = {116, 114, 114};
+  constexpr std::uint32_t kSpan[3] = {40, 48, 34};
+  std::vector<float> positions;
+  std::mt19937 random(5);
+  for (int i = 0; i < 3 * 12000; ++i) {
+    const float offset = static_cast<float>(random() % (kSpan[i % 3] * steps)) / static_cast<float>(steps);
+    positions.push_back(static_cast<float>(kLow[i % 3]) + offset);
+  }
+  return positions;
+}
+
 TEST_P(Lookup, TrilinearIsExactAcrossFaces) {
   const format::Pack pack = openPack(everything());
   const auto view = GridView::load(pack, pack.gridFrames()[0]);
   ASSERT_TRUE(view.has_value());
   const auto renderer = makeRenderer({.blocks = GetParam().blocks});
   const auto frame = upload(*renderer, pack, 0, {.index = GetParam().index});
-  std::vector<float> positions;
-  std::mt19937 random(5);
-  for (int i = 0; i < 3 * 8000; ++i) {
-    const float low = i % 3 == 2 ? 110 : 104;
-    positions.push_back(low + static_cast<float>(random() % 4096) / 4096 * 44);
-  }
+  const std::vector<float> positions = randomPositions(4096);
   const auto values = gpu().lookup(*renderer, *frame, 0, Filter::trilinear, positions);
   ASSERT_TRUE(values.has_value()) << values.error().message;
   for (std::size_t i = 0; i < values->size(); ++i) {
-    // Three linear steps of rounding on values up to 60.
-    ASSERT_NEAR((*values)[i], cpuTrilinear(*view, &positions[i * 3]), 3e-5) << "sample " << i;
+    // Three linear steps of rounding on values up to 4.
+    ASSERT_NEAR((*values)[i], cpuTrilinear(*view, &positions[i * 3]), 3e-6) << "sample " << i;
+  }
+}
+
+// Integers of less than 2^17, weighted by multiples of 1/64: sums have 23 bits at most, so nothing may be rounded.
+TEST_P(Lookup, TrilinearIsTheSameToTheBitWhereNothingIsRounded) {
+  const format::Pack pack = openPack(everything(true));
+  const auto view = GridView::load(pack, pack.gridFrames()[0]);
+  ASSERT_TRUE(view.has_value());
+  const auto renderer = makeRenderer({.blocks = GetParam().blocks});
+  const auto frame = upload(*renderer, pack, 0, {.index = GetParam().index});
+  const std::vector<float> positions = randomPositions(4);
+  const auto values = gpu().lookup(*renderer, *frame, 0, Filter::trilinear, positions);
+  ASSERT_TRUE(values.has_value()) << values.error().message;
+  for (std::size_t i = 0; i < values->size(); ++i) {
+    ASSERT_EQ(double{(*values)[i]}, cpuTrilinear(*view, &positions[i * 3]))
+        << "sample " << i << " at (" << positions[i * 3] << ", " << positions[i * 3 + 1] << ", " << positions[i * 3 + 2]
+        << ")";
   }
 }
 
@@ -155,8 +180,10 @@ TEST_F(Upload, CountsTheBytesThatTheFormatPromises) {
     for (std::uint32_t i = 0; i < 7; ++i) {
       grid.brick({10, 10, 10 + i}, format::kEncodingBc7Z, randomBytes(128, i), 0, 0.01f, format::kMaskAll);
     }
-    grid.brick({10, 11, 10}, format::kEncodingR8, randomBytes(512, 9), 0, 0.01f, 0, someMask(1));
-    grid.brick({10, 11, 11}, format::kEncodingR16, randomBytes(1024, 9), 0, 0.0001f, format::kMaskAll);
+    grid.brick({10, 11, 10}, format::kEncodingUniform8, randomBytes(512, 9), 0, 0.01f, 0, someMask(1));
+    grid.brick({10, 11, 11}, format::kEncodingUniform16, randomBytes(1024, 9), 0, 0.0001f, format::kMaskAll);
+    grid.brick({10, 11, 12}, format::kEncodingLocal2, randomBytes(160, 9), 0, 0.001f, format::kMaskTexel);
+    grid.brick({10, 11, 13}, format::kEncodingCoarse, randomBytes(64, 9), 0, 0.001f, format::kMaskAll);
   }));
   const auto renderer = makeRenderer({.blocks = BlockUse::native});
   const std::uint64_t before = renderer->bytesInUse();
@@ -165,7 +192,7 @@ TEST_F(Upload, CountsTheBytesThatTheFormatPromises) {
   EXPECT_EQ(frame->stats().payload(), promised.total());
   EXPECT_EQ(frame->stats().maskBytes, promised.maskBytes);
   EXPECT_EQ(frame->stats().bc7Bricks, 7u);
-  EXPECT_EQ(frame->stats().r8Slots, 3u);
+  EXPECT_EQ(frame->stats().bufferBricks, 4u);
   EXPECT_GE(frame->stats().allocatedBytes, frame->stats().payload());
   EXPECT_GE(renderer->bytesInUse(), before + frame->stats().allocatedBytes);
   gpu().waitIdle();

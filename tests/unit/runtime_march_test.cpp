@@ -182,13 +182,13 @@ std::vector<std::byte> ball() {
       std::vector<std::byte> texels(512);
       bool any = false;
       for (std::uint32_t i = 0; i < 512; ++i) {
-        const double x = at[0] * 8 + (i & 7) - 130.0, y = at[1] * 8 + (i >> 3 & 7) - 130.0,
-                     z = at[2] * 8 + (i >> 6) - 130.0;
+        const double x = at[0] * 8 + (i >> 6) - 130.0, y = at[1] * 8 + (i >> 3 & 7) - 130.0,
+                     z = at[2] * 8 + (i & 7) - 130.0;
         if (x * x + y * y + z * z > 24 * 24) continue;
         texels[i] = std::byte{255};
         any = true;
       }
-      if (any) grid.brick({at[0], at[1], at[2]}, format::kEncodingR8, texels, 0, 1.0f / 255, format::kMaskTexel);
+      if (any) grid.brick({at[0], at[1], at[2]}, format::kEncodingUniform8, texels, 0, 1.0f / 255, format::kMaskTexel);
     }
   });
 }
@@ -247,7 +247,7 @@ std::vector<std::byte> scattered(bool affine, double& mass) {
       }
       for (const std::byte texel : texels) mass += std::to_integer<int>(texel) / 255.0;
       const std::uint32_t slot = i * 7 % 24;  // apart, and in two Node4s
-      grid.brick({14 + slot % 3 * 2, 14 + slot / 3 % 2 * 3, 14 + slot / 6 * 2}, format::kEncodingR8, texels, 0,
+      grid.brick({14 + slot % 3 * 2, 14 + slot / 3 % 2 * 3, 14 + slot / 6 * 2}, format::kEncodingUniform8, texels, 0,
                  1.0f / 255, format::kMaskTexel);
     }
     tables.gridFrames.push_back(grid.finish(tables));

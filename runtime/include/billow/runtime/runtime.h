@@ -57,8 +57,8 @@ struct HostDevice {
   VkPipelineCache pipelineCache = VK_NULL_HANDLE;  // optional: pipelines are looked up in it and added to it
 };
 
-// What becomes of BC7 and BC4 bricks. Automatic: they stay blocks where the device reads them exactly and fast, else
-// they are decoded to R8, as on software devices. native: blocks wherever they are read exactly.
+// What becomes of BC7 bricks. Automatic: they stay blocks where the device samples such 3D images fast, else they are
+// decoded to uniform bricks of 8 bits, as on software devices. native: blocks wherever the device samples them.
 enum class BlockUse { automatic, native, decoded };
 
 struct Config {
@@ -93,9 +93,8 @@ struct FrameStats {
   std::uint64_t maskBytes = 0;
   std::uint64_t brickBytes = 0;      // of the slots in use
   std::uint64_t allocatedBytes = 0;  // what Vulkan was asked for, alignment and unused slots included
-  std::uint32_t bc7Bricks = 0;       // distinct, that stayed BC7
-  std::uint32_t bc4Bricks = 0;       // distinct, that stayed BC4
-  std::uint32_t r8Slots = 0;         // of the R8 atlas; an R16 brick takes two
+  std::uint32_t bc7Bricks = 0;       // distinct, in the atlas
+  std::uint32_t bufferBricks = 0;    // distinct, in the buffer: all others
   std::uint64_t payload() const { return indexBytes + recordBytes + maskBytes + brickBytes; }
 };
 
