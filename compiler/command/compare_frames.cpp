@@ -1,0 +1,100 @@
+#include "compare_frames.h"
+
+#include <fmt/format.h>
+
+#include "billow/format/psnr.h"
+#include "import_options.h"
+#include "pack_lookup.h"
+#include "reconstruct.h"
+
+namespace billow::command {
+namespace {
+
+class Comparison {
+ public:
+  Comparison(const format::Pack& pack, const compiler::ImportOptions& options, const ObserveGrid& observe)
+      : pack_(pack), options_(options), observe_(observe) {}
+
+  // Nullopt, or what is wrong with the pack.
+  std::optional<format::Issue> compareVolume(const compiler::PlannedVolume& planned,
+                                             const format::VolumeRecord& volume) {
+    for (const compiler::PlannedFrame& frame : planned.frames) {
+      const std::ptrdiff_t index = findFrame(pack_, volume, frame.number);
+      if (index < 0) {
+        rows_.push_back({planned.name, "", frame.number, {}, 0, "the pack has no such frame"});
+        continue;
+      }
+      const compiler::ImportedFrame source = compiler::importFrame(planned, frame, options_, printWarning);
+      for (std::size_t g = 0; g < planned.grids.size(); ++g) {
+        GridRow row{planned.name, planned.grids[g].name, frame.number, {}, 0, ""};
+        auto issue = compareGrid(source.grids[g], volume, static_cast<std::uint32_t>(index), row);
+        if (issue) return issue;
+        if (source.grids[g].present || !row.problem.empty()) rows_.push_back(row);
+      }
+    }
+    return std::nullopt;
+  }
+
+  std::vector<GridRow> takeRows() { return std::move(rows_); }
+
+ private:
+  std::optional<format::Issue> compareGrid(const compiler::ImportedGrid& source, const format::VolumeRecord& volume,
+                                           std::uint32_t frame, GridRow& row) {
+    const std::ptrdiff_t grid = findGrid(pack_, volume, row.grid);
+    if (grid < 0) {
+      row.problem = "the pack has no such grid";
+      return std::nullopt;
+    }
+    const format::GridFrame& gridFrame = pack_.gridFrame(volume, frame, static_cast<std::uint32_t>(grid));
+    const bool present = (gridFrame.flags & format::kGridPresent) != 0;
+    if (present != source.present) row.problem = present ? "only the pack has it here" : "only the source has it here";
+    if (!present || !source.present) return std::nullopt;
+    const auto view = format::GridView::load(pack_, gridFrame);
+    if (!view) return view.error();
+    const compiler::ImportedGrid pack = reconstruct(*view);
+    row.error = measureError(source, pack);
+    row.range = static_cast<double>(source.max) - static_cast<double>(source.min);
+    if (source.background != gridFrame.background) {
+      row.problem = fmt::format("background {} in the pack, {} in the source", gridFrame.background, source.background);
+    }
+    observe_({row, source, pack, *view});
+    return std::nullopt;
+  }
+
+  const format::Pack& pack_;
+  const compiler::ImportOptions& options_;
+  const ObserveGrid& observe_;
+  std::vector<GridRow> rows_;
+};
+
+}  // namespace
+
+double GridRow::psnr() const {
+  return format::psnr(range, error.squaredError, error.sourceVoxels);
+}
+
+bool GridRow::sound() const {
+  return problem.empty() && error.mismatchedVoxels == 0;
+}
+
+const format::VolumeRecord& matchVolume(const format::Pack& pack, const compiler::Plan& plan,
+                                        const compiler::PlannedVolume& volume) {
+  const bool single = pack.volumes().size() == 1 && plan.volumes.size() == 1;
+  if (single) return pack.volumes().front();
+  for (const format::VolumeRecord& record : pack.volumes()) {
+    if (pack.string(record.name) == volume.name) return record;
+  }
+  throw compiler::Error(compiler::Fault::input, fmt::format("the pack has no volume '{}'", volume.name));
+}
+
+format::Result<std::vector<GridRow>> compareFrames(const format::Pack& pack, const compiler::Plan& plan,
+                                                   const compiler::ImportOptions& options, const ObserveGrid& observe) {
+  Comparison comparison(pack, options, observe);
+  for (const compiler::PlannedVolume& volume : plan.volumes) {
+    auto issue = comparison.compareVolume(volume, matchVolume(pack, plan, volume));
+    if (issue) return tl::make_unexpected(*issue);
+  }
+  return comparison.takeRows();
+}
+
+}  // namespace billow::command
