@@ -72,6 +72,7 @@ figure{margin:0;min-width:0}
 .bars p{display:flex;justify-content:space-between;gap:1rem;margin:0;max-width:none;font-size:.88rem}
 svg.bar{width:100%;height:16px;background:var(--rule)}
 svg.bar rect,svg.columns rect{stroke:var(--card);stroke-width:.6;vector-effect:non-scaling-stroke}
+svg.columns.dense rect{stroke:none;shape-rendering:crispEdges}
 .legend{display:flex;flex-wrap:wrap;gap:.2rem 1.1rem;list-style:none;margin:0 0 .9rem;padding:0;font-size:.85rem}
 .legend .swatch{width:12px;height:12px;margin-right:.35rem}
 )";
