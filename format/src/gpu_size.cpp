@@ -1,5 +1,7 @@
 #include "billow/format/gpu_size.h"
 
+#include <unordered_set>
+
 #include "billow/format/brick.h"
 
 namespace billow::format {
@@ -41,6 +43,19 @@ GpuBytes gpuBytes(const GridFrame& gridFrame) {
   // A flat table costs one load a sample where the tree costs four, so it may be somewhat larger.
   bytes.index = flat <= tree + payload / 4 ? GpuIndex::flat : GpuIndex::tree;
   bytes.indexBytes = bytes.index == GpuIndex::flat ? flat : tree;
+  return bytes;
+}
+
+std::uint64_t packGpuBytes(std::span<const GridFrame> gridFrames,
+                           const std::array<std::uint64_t, kStreamCount>& stored) {
+  const auto items = [&](Stream stream) { return stored[static_cast<std::size_t>(stream)]; };
+  std::uint64_t bytes = items(Stream::node3) * kGpuRecordBytes + items(Stream::mask) * sizeof(Mask3) +
+                        items(Stream::unit) * kBrickUnitBytes;
+  std::unordered_set<std::uint32_t> roots;  // grid frames of one root have one index
+  for (const GridFrame& gridFrame : gridFrames) {
+    if (gridFrame.node5 == kNone || !roots.insert(gridFrame.node5).second) continue;
+    bytes += gpuBytes(gridFrame).indexBytes + gridFrame.tileCount * kGpuRecordBytes;
+  }
   return bytes;
 }
 

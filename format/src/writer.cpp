@@ -160,7 +160,7 @@ std::uint32_t PackWriter::pageOf(Stream stream, std::uint32_t index) const {
   return static_cast<std::uint32_t>(after - pages.begin());
 }
 
-void PackWriter::finish(const PackTables& tables) {
+std::uint64_t PackWriter::close(const PackTables& tables) {
   Impl& impl = *impl_;
   impl.closePage();
   while (!impl.compressor.empty()) impl.writeOldest();
@@ -176,7 +176,11 @@ void PackWriter::finish(const PackTables& tables) {
   impl.writeSection(kSectionPageTable, kSectionRequired, bytesOf(impl.pages));
   if (!tables.infoJson.empty()) impl.writeSection(kSectionInfo, 0, std::as_bytes(std::span(tables.infoJson)));
   impl.writeHeader();
-  impl.file.commit(impl.end);
+  return impl.end;
+}
+
+void PackWriter::commit() {
+  impl_->file.commit(impl_->end);
 }
 
 }  // namespace billow::format

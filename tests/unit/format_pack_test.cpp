@@ -220,6 +220,38 @@ TEST(Pack, FinishedFileReplacesTheOld) {
   }
 }
 
+TEST(Pack, ClosedFilesHaveTheirSizeButNoNameYet) {
+  const TempFolder folder;
+  const std::string path = folder / "a.blw";
+  PackTables tables = tests::sampleTables("v", {"density"}, 1);
+  tables.gridFrames.assign(1, tests::absentGridFrame());
+  { EXPECT_GT(PackWriter(path, {}).close(tables), 0u); }
+  EXPECT_TRUE(folder.empty());
+  PackWriter writer(path, {});
+  const std::uint64_t size = writer.close(tables);
+  EXPECT_FALSE(std::filesystem::exists(path));
+  writer.commit();
+  EXPECT_EQ(std::filesystem::file_size(path), size);
+}
+
+// Two grid frames of one root, and a third of another: what is shared counts once.
+TEST(Pack, GpuBytesOfThePackCountWhatIsSharedOnce) {
+  GridFrame first{};
+  first.node5 = 0;
+  first.activeMax[0] = first.activeMax[1] = first.activeMax[2] = 15;  // 2^3 cells
+  first.tileCount = 1;
+  GridFrame other = first;
+  other.node5 = 1;
+  GridFrame absent{};
+  absent.node5 = kNone;
+  const GridFrame frames[] = {first, first, other, absent};
+  std::array<std::uint64_t, kStreamCount> stored{};
+  stored[static_cast<std::size_t>(Stream::unit)] = 100;
+  stored[static_cast<std::size_t>(Stream::mask)] = 10;
+  stored[static_cast<std::size_t>(Stream::node3)] = 7;
+  EXPECT_EQ(packGpuBytes(frames, stored), 100 * kBrickUnitBytes + 10 * 64 + 7 * 16 + 2 * (8 * 4 + 16));
+}
+
 TEST(Pack, UnreadablePathsAreIoIssues) {
   const TempFolder folder;
   for (const std::string& path : {folder / "missing.blw", folder / ""}) {

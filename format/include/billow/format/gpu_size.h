@@ -2,7 +2,9 @@
 #ifndef BILLOW_FORMAT_GPU_SIZE_H
 #define BILLOW_FORMAT_GPU_SIZE_H
 
+#include <array>
 #include <cstdint>
+#include <span>
 
 #include "billow/format/layout.h"
 
@@ -35,6 +37,11 @@ struct CellBox {
 CellBox cellBox(const GridFrame& gridFrame);
 
 GpuBytes gpuBytes(const GridFrame& gridFrame);
+
+// Of all grid frames together where all are resident: what they share is counted once. `stored`: items of each stream
+// in the pack (the page table's last range ends).
+std::uint64_t packGpuBytes(std::span<const GridFrame> gridFrames,
+                           const std::array<std::uint64_t, kStreamCount>& stored);
 
 // Adds a distinct brick of a known encoding to the grid frame's counts; a constant adds nothing.
 void countBrick(GridFrame& gridFrame, std::uint32_t encoding);

@@ -25,7 +25,7 @@ struct PackTables {
   StringRef addString(const std::string& text);  // equal strings share
 };
 
-// Writes to a temporary name beside `path`, renamed by finish(); the destructor removes what is unfinished.
+// Writes to a temporary name beside `path`, renamed by commit(); the destructor removes what is unfinished.
 // Throws std::system_error (with the path) when the file cannot be written.
 class PackWriter {
  public:
@@ -45,8 +45,15 @@ class PackWriter {
   // The page in which the stream's item lies (or will lie, while its page is open).
   std::uint32_t pageOf(Stream stream, std::uint32_t index) const;
 
-  // Writes tables, contents and header, flushes and renames. `tables` must keep the rules of spec/format.md.
-  void finish(const PackTables& tables);
+  // Writes tables, contents and header: the file is whole but for its name. Returns its size in bytes. Once, after the
+  // last append. `tables` must keep the rules of spec/format.md.
+  std::uint64_t close(const PackTables& tables);
+  // After close(): flushes and renames.
+  void commit();
+  void finish(const PackTables& tables) {
+    close(tables);
+    commit();
+  }
 
  private:
   struct Impl;
