@@ -17,8 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "encode/texel_range.h"
-#include "encode/wide/wide_encoder.h"
+#include "encode/brick_lanes.h"
 #include "grid_corpus.h"
 
 namespace {
@@ -38,7 +37,7 @@ compiler::BrickSource sourceOf(const Brick& brick) {
 }
 
 compiler::TexelRange rangeOf(const Brick& brick) {
-  return compiler::coverRange(compiler::wideEncoder().activeRange(sourceOf(brick)), 0, 255);
+  return compiler::coverRange(compiler::activeRange(sourceOf(brick)), 0, 255);
 }
 
 std::string fileName(const Corpus& corpus) {
@@ -59,7 +58,7 @@ void writePng(const Corpus& corpus, const std::string& path) {
   for (std::size_t b = 0; b < corpus.bricks.size(); ++b) {
     const Brick& brick = corpus.bricks[b];
     compiler::TexelTargets targets;
-    compiler::wideEncoder().texelTargets(sourceOf(brick), rangeOf(brick), 0, 255, targets);
+    compiler::texelTargets(sourceOf(brick), rangeOf(brick), 0, 255, targets);
     for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) {
       const std::size_t x = i >> 6, y = i >> 3 & 7, z = i & 7;
       const std::size_t column = b % kBricksAcross * kBrickWidth + x;
@@ -105,7 +104,7 @@ double ddsError(const Corpus& corpus, const std::string& path) {
     candidate.scale = range.scale;
     format::Texels texels;
     format::decodeTexels(format::kEncodingBc7Z, {candidate.payload.data(), 128}, texels);
-    compiler::wideEncoder().measure(sourceOf(corpus.bricks[b]), texels, candidate);
+    compiler::measure(sourceOf(corpus.bricks[b]), texels, candidate);
     squared += candidate.squaredError;
   }
   return squared;

@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "brick_corpus.h"
-#include "encode/bc7_block.h"
 #include "encode/texel_range.h"
 #include "stages.h"
 
@@ -49,7 +48,7 @@ std::vector<Encoder> allEncoders() {
                           compiler::encodeBc7(source, format::kEncodingBc7Z + axis, 1, out);
                         }});
   }
-  for (int effort = 0; effort <= 5; ++effort) {
+  for (const int effort : {0, 3, 9}) {
     encoders.push_back({"BC7 best axis, effort " + std::to_string(effort),
                         [effort](const auto& src, Candidate& out) { compiler::encodeBc7BestAxis(src, effort, out); }});
   }
@@ -301,106 +300,6 @@ TEST(Encode, bestAxisFollowsTheLayers) {
   }
 }
 
-double totalError(const std::vector<Brick>& bricks, int effort) {
-  double total = 0;
-  Candidate candidate;
-  for (const Brick& brick : bricks) {
-    compiler::encodeBc7BestAxis(sourceOf(brick), effort, candidate);
-    total += candidate.squaredError;
-  }
-  return total;
-}
-
-TEST(Encode, effortPays) {
-  std::vector<Brick> bricks = tests::cloudBricks(32);
-  for (const NamedBrick& named : corpus()) {
-    if (named.name.starts_with("noise")) bricks.push_back(named.brick);
-  }
-  double before = std::numeric_limits<double>::max();
-  for (int effort = 0; effort <= 5; ++effort) {
-    const double total = totalError(bricks, effort);
-    EXPECT_LT(total, before) << effort;
-    before = total;
-  }
-}
-
-TEST(Encode, smoothCloudReachesItsPsnr) {
-  const std::vector<Brick> bricks = tests::cloudBricks(128);
-  float highest = 0;
-  std::uint64_t voxels = 0;
-  for (const Brick& brick : bricks) {
-    voxels += brick.activeCount;
-    for (const float value : brick.values) highest = std::max(highest, value);
-  }
-  const auto psnr = [&](double squared) {
-    return 20 * std::log10(static_cast<double>(highest) / std::sqrt(squared / static_cast<double>(voxels)));
-  };
-  EXPECT_GT(psnr(totalError(bricks, 0)), 47.0);
-  EXPECT_GT(psnr(totalError(bricks, 1)), 48.2);
-  EXPECT_GT(psnr(totalError(bricks, 3)), 48.6);
-}
-
-TEST(Encode, everyModeIsUsed) {
-  std::uint32_t used[8] = {};
-  std::vector<Brick> bricks = tests::cloudBricks(48);
-  for (const NamedBrick& named : corpus()) bricks.push_back(named.brick);
-  // One slice in four unlike the others, the others smooth: what modes 4 and 5 are for.
-  for (std::uint32_t seed = 0; seed < 4; ++seed) {
-    bricks.push_back(makeBrick([=](auto x, auto y, auto z) {
-      const float noise = tests::randomValue(seed, format::voxelIndex(x, y, z));
-      return (z & 3) == seed ? noise : static_cast<float>(x + y) / 16.0f;
-    }));
-  }
-  Candidate candidate;
-  for (const Brick& brick : bricks) {
-    compiler::encodeBc7(sourceOf(brick), format::kEncodingBc7Z, 4, candidate);
-    for (std::size_t b = 0; b < 8; ++b) {
-      ++used[std::countr_zero(std::to_integer<std::uint8_t>(candidate.payload[16 * b]))];
-    }
-  }
-  for (const int mode : {0, 1, 2, 3}) EXPECT_EQ(used[mode], 0u) << mode;
-  for (const int mode : {4, 5, 6, 7}) EXPECT_GT(used[mode], 0u) << mode;
-}
-
-// The search minimises what the decoder will give, not an approximation of it.
-TEST(Encode, errorOfAFitIsThatOfItsBlock) {
-  for (std::uint32_t seed = 0; seed < 300; ++seed) {
-    compiler::Plane plane;
-    plane.uniform = seed % 3 == 0;
-    for (std::uint32_t c = 0; c < 4; ++c) {
-      for (std::uint32_t i = 0; i < 16; ++i) {
-        const float noise = tests::randomValue(seed, 16 * c + i);
-        const float smooth = static_cast<float>((i & 3) + (i >> 2) + c) / 9.0f;
-        plane.value[c][i >> 2][i & 3] = 255.0f * (seed % 2 == 0 ? noise : 0.8f * smooth + 0.2f * noise);
-        plane.weight[c][i >> 2][i & 3] = plane.uniform || tests::hash(seed, c, i) % 4 != 0 ? 1.0f : 0.0f;
-      }
-    }
-    const compiler::Bc7Search search = compiler::bc7Search(static_cast<int>(seed % 6));
-    compiler::Bc7Fit fits[3];
-    fits[0] = compiler::fitMode6(plane, search);
-    fits[1].error = fits[2].error = 1e30f;
-    fits[1].line[0] = fits[0].line[0];
-    fits[1].steps = fits[0].steps;
-    if (search.rotations > 0) compiler::tryModes4And5(plane, search, fits[1]);
-    if (search.partitions > 0) compiler::tryMode7(plane, search, fits[2]);
-    for (const compiler::Bc7Fit& fit : fits) {
-      if (fit.error >= 1e30f) continue;
-      std::byte block[16];
-      compiler::packBlock(fit, block);
-      std::uint8_t rgba[16][4];
-      format::decodeBc7Block(block, rgba);
-      double squared = 0;
-      for (std::uint32_t i = 0; i < 16; ++i) {
-        for (std::uint32_t c = 0; c < 4; ++c) {
-          const double error = rgba[i][c] - static_cast<double>(plane.value[c][i >> 2][i & 3]);
-          squared += error * error * static_cast<double>(plane.weight[c][i >> 2][i & 3]);
-        }
-      }
-      EXPECT_NEAR(static_cast<double>(fit.error), squared, 1e-4 * squared + 1e-4) << seed << " mode " << fit.mode;
-    }
-  }
-}
-
 // 64-bit FNV-1a over everything that reaches a pack, for a fixed set of bricks. gcc, clang, debug, release and any CPU
 // must agree on it; it changes only when an encoder is changed on purpose.
 TEST(Encode, everyBuildWritesTheSameBytes) {
@@ -423,7 +322,7 @@ TEST(Encode, everyBuildWritesTheSameBytes) {
       add(candidate.payload.data(), *format::brickBytes(candidate.encoding));
     }
   }
-  EXPECT_EQ(digest, 2621253280217912900u);
+  EXPECT_EQ(digest, 9978364302695799823u);
 }
 
 }  // namespace

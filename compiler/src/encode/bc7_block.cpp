@@ -34,17 +34,17 @@ struct Fields {
   std::uint32_t steps[2][16];  // all channels or colour; the separate channel
 };
 
-Fields toFields(const Bc7Fit& fit) {
+Fields toFields(const Bc7Fits& fits, std::uint32_t block) {
   Fields fields{};
   for (std::uint32_t c = 0; c < 4; ++c) {
     for (std::uint32_t s = 0; s < 2; ++s) {
-      fields.ends[2 * s][c] = static_cast<std::uint32_t>(fit.line[s].first[c]);
-      fields.ends[2 * s + 1][c] = static_cast<std::uint32_t>(fit.line[s].second[c]);
+      fields.ends[2 * s][c] = static_cast<std::uint32_t>(fits.first[s][c][block]);
+      fields.ends[2 * s + 1][c] = static_cast<std::uint32_t>(fits.second[s][c][block]);
     }
   }
   for (std::uint32_t i = 0; i < 16; ++i) {
-    fields.steps[0][i] = static_cast<std::uint32_t>(fit.steps.step[i >> 2][i & 3]);
-    fields.steps[1][i] = static_cast<std::uint32_t>(fit.separateSteps.step[i >> 2][i & 3]);
+    fields.steps[0][i] = static_cast<std::uint32_t>(fits.step[i][block]);
+    fields.steps[1][i] = static_cast<std::uint32_t>(fits.separateStep[i][block]);
   }
   return fields;
 }
@@ -77,46 +77,51 @@ void putSteps(const std::uint32_t steps[16], std::uint32_t bits, std::uint32_t a
 
 Bc7Search bc7Search(int effort) {
   static constexpr Bc7Search kSearches[] = {
-      // passes, rotations, ranked, partitions, mode4, allPBits, nudge, everyAxis
-      {2, 0, 0, 0, false, false, false, false}, {2, 1, 16, 1, true, false, false, false},
-      {3, 1, 64, 2, true, false, false, false}, {3, 4, 64, 4, true, true, false, true},
-      {4, 4, 64, 10, true, true, true, true},   {8, 4, 64, 64, true, true, true, true},
+      // passes, starts, rotations, ranked, partitions, nudges, mode4, allPBits, everyAxis, ranges
+      {1, 1, 0, 0, 0, 0, false, false, false, 0},  // 0: mode 6 alone
+      {1, 1, 1, 16, 1, 0, true, false, false,
+       0},  // 1: the other modes, with the likeliest rotation and partition of 16
+      {2, 1, 1, 64, 2, 0, true, false, false, 0},  // 2: the two likeliest of all partitions
+      {2, 1, 4, 64, 4, 0, true, true, true, 0},    // 3: all modes, rotations and p-bits along each packed axis
+      {2, 2, 4, 64, 4, 0, true, true, true, 1},    // 4: a second first guess; the brick's range solved with the blocks
+      {2, 2, 4, 64, 6, 1, true, true, true, 1},    // 5: ends moved by single steps
+      {3, 3, 4, 64, 8, 2, true, true, true, 1},    // 6: a third guess, more steps and partitions
+      {3, 3, 4, 64, 12, 4, true, true, true, 2},   // 7: the same, until little is gained
+      {4, 4, 4, 64, 16, 4, true, true, true, 3},   // 8: a fourth guess
+      {6, 4, 4, 64, 32, 8, true, true, true, 4},   // 9: half of all partitions
   };
-  return kSearches[std::clamp(effort, 0, 5)];
+  return kSearches[std::clamp(effort, 0, 9)];
 }
 
-void tryOtherModes(const Plane& plane, const Bc7Search& search, Bc7Fit& best) {
-  if (best.error <= 0.0f) return;
-  if (search.rotations > 0) tryModes4And5(plane, search, best);
-  if (search.partitions > 0) tryMode7(plane, search, best);
-}
-
-void packBlock(const Bc7Fit& fit, std::byte* block) {
-  const format::Bc7Mode& mode = format::kBc7Modes[fit.mode];
-  Fields fields = toFields(fit);
+void packBlock(const Bc7Fits& fits, std::uint32_t block, std::byte* bytes) {
+  const auto number = static_cast<std::uint32_t>(fits.mode[block]);
+  const format::Bc7Mode& mode = format::kBc7Modes[number];
+  const std::uint32_t partition = mode.subsets == 2 ? static_cast<std::uint32_t>(fits.partition[block]) : 0;
+  const bool colorIsSecond = number == 4 && fits.colorIsSecond[block] != 0;
+  Fields fields = toFields(fits, block);
   const bool separate = mode.indexBits2 != 0;
-  const std::uint32_t bits = fit.colorIsSecond ? mode.indexBits2 : mode.indexBits;
-  const std::uint32_t second = mode.subsets == 2 ? format::kBc7Partitions2[fit.partition] : 0u;
+  const std::uint32_t bits = colorIsSecond ? mode.indexBits2 : mode.indexBits;
+  const std::uint32_t second = mode.subsets == 2 ? format::kBc7Partitions2[partition] : 0u;
   std::uint32_t anchors = 1;
   anchorLine(fields.steps[0], bits, 0, ~second, fields.ends[0], fields.ends[1], separate ? 3 : 4);
   if (mode.subsets == 2) {
-    const std::uint32_t anchor = format::bc7Anchor(format::kBc7Anchors2, fit.partition);
+    const std::uint32_t anchor = format::bc7Anchor(format::kBc7Anchors2, partition);
     anchorLine(fields.steps[0], bits, anchor, second, fields.ends[2], fields.ends[3], 4);
     anchors |= 1u << anchor;
   }
-  const std::uint32_t separateBits = fit.colorIsSecond ? mode.indexBits : mode.indexBits2;
+  const std::uint32_t separateBits = colorIsSecond ? mode.indexBits : mode.indexBits2;
   if (separate) {
     anchorLine(fields.steps[1], separateBits, 0, 0xffffu, &fields.ends[0][3], &fields.ends[1][3], 1);
   }
   BitWriter writer;
-  writer.put(1u << fit.mode, fit.mode + 1);
-  writer.put(fit.partition, mode.partitionBits);
-  writer.put(fit.rotation, mode.rotationBits);
-  writer.put(fit.colorIsSecond ? 1 : 0, mode.selectorBits);
+  writer.put(1u << number, number + 1);
+  writer.put(partition, mode.partitionBits);
+  if (mode.rotationBits != 0) writer.put(static_cast<std::uint32_t>(fits.rotation[block]), mode.rotationBits);
+  writer.put(colorIsSecond ? 1 : 0, mode.selectorBits);
   putEnds(mode, fields, writer);
-  putSteps(fields.steps[fit.colorIsSecond ? 1 : 0], mode.indexBits, anchors, writer);
-  if (separate) putSteps(fields.steps[fit.colorIsSecond ? 0 : 1], mode.indexBits2, anchors, writer);
-  writer.store(block);
+  putSteps(fields.steps[colorIsSecond ? 1 : 0], mode.indexBits, anchors, writer);
+  if (separate) putSteps(fields.steps[colorIsSecond ? 0 : 1], mode.indexBits2, anchors, writer);
+  writer.store(bytes);
 }
 
 }  // namespace billow::compiler

@@ -1,48 +1,50 @@
-// One BC7 block: the modes that can carry four free channels (4, 5, 6 and 7), tried in order of their price.
+// BC7 blocks, the eight of a brick at a time: the modes that can carry four free channels (4, 5, 6 and 7).
 #ifndef BILLOW_COMPILER_ENCODE_BC7_BLOCK_H
 #define BILLOW_COMPILER_ENCODE_BC7_BLOCK_H
 
 #include <cstddef>
 #include <cstdint>
 
-#include "encode/bc7_plane.h"
+#include "encode/brick_lanes.h"
 
 namespace billow::compiler {
 
-// A block as it will be stored. Ends of lines are the 8-bit values to which the decoder expands the stored ones.
-struct Bc7Fit {
-  std::uint32_t mode = 6;
-  std::uint32_t partition = 0;  // mode 7
-  std::uint32_t rotation = 0;   // modes 4 and 5: channel rotation - 1 has changed places with channel 3
-  bool colorIsSecond = false;   // mode 4: colour has the three-bit steps
-  Line line[2] = {};            // by subset; modes 4 and 5 keep the separate channel in lane 3
-  Steps steps = {};             // of all texels; modes 4 and 5: of the three colour channels
-  Steps separateSteps = {};     // modes 4 and 5
-  float error = 1e30f;          // squared, in texel units
+// The blocks of a brick as they will be stored, by block in the last index. Integers, as floats for the sake of SIMD.
+struct Bc7Fits {
+  alignas(32) float mode[8];
+  float partition[8];      // mode 7
+  float rotation[8];       // modes 4 and 5: channel rotation - 1 has changed places with channel 3
+  float colorIsSecond[8];  // mode 4: 1 where colour has the three-bit steps
+  float first[2][4][8];    // ends by subset and channel, as the decoder expands them to eight bits; modes 4 and 5 keep
+  float second[2][4][8];   // the separate channel in channel 3
+  float step[16][8];       // of all texels; modes 4 and 5: of the three colour channels
+  float separateStep[16][8];
+  float error[8];  // squared, in texel units
 };
 
 // How much is tried. The higher an effort, the more.
 struct Bc7Search {
-  int passes = 2;          // of least squares and requantisation
+  int passes = 1;          // of least squares and requantisation
+  int starts = 1;          // first guesses at a line, at most 4
   int rotations = 0;       // modes 4 and 5: none, the channel that mode 6 serves worst, or all four
-  int ranked = 0;          // partitions of mode 7 that are compared: the first so many, a multiple of 4, at most 64
-  int partitions = 0;      // of those that are tried, the most promising first
+  int ranked = 0;          // partitions of mode 7 that are compared, at most 64
+  int partitions = 0;      // of those that are tried, the most promising first, at most 32
+  int nudges = 0;          // rounds of moving each end by single steps
   bool mode4 = false;      // else mode 5 alone
   bool allPBits = false;   // every combination, not just the nearest
-  bool nudge = false;      // each end of mode 6 by single steps
   bool everyAxis = false;  // all modes for each packed axis, not just for the one that mode 6 serves best
+  int ranges = 0;          // rounds of solving the brick's lo and scale and encoding again
 };
-// `effort` in [0, 5]; others are clamped.
+// `effort` in [0, 9]; others are clamped.
 Bc7Search bc7Search(int effort);
 
-Bc7Fit fitMode6(const Plane& plane, const Bc7Search& search);
-// Replaces `best` where another mode has a smaller error.
-void tryOtherModes(const Plane& plane, const Bc7Search& search, Bc7Fit& best);
-void tryModes4And5(const Plane& plane, const Bc7Search& search, Bc7Fit& best);
-void tryMode7(const Plane& plane, const Bc7Search& search, Bc7Fit& best);
+// Mode 6 replaces all of `fits`; the others replace what they better.
+void fitMode6(const BlockTexels& texels, const Bc7Search& search, Bc7Fits& fits);
+void tryModes4And5(const BlockTexels& texels, const Bc7Search& search, Bc7Fits& fits);
+void tryMode7(const BlockTexels& texels, const Bc7Search& search, Bc7Fits& fits);
 
 // Writes 16 bytes.
-void packBlock(const Bc7Fit& fit, std::byte* block);
+void packBlock(const Bc7Fits& fits, std::uint32_t block, std::byte* bytes);
 
 }  // namespace billow::compiler
 

@@ -1,126 +1,162 @@
 // Modes 4 and 5: one line through three channels, the fourth on its own. For blocks with one slice unlike the others.
-#include <utility>
-
 #include "encode/bc7_block.h"
-#include "encode/bc7_ends.h"
-#include "encode/scalar_fit.h"
 
-namespace billow::compiler {
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "encode/bc7_mode45.cpp"
+#include <hwy/foreach_target.h>
+
+#include "encode/bc7_fit-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace billow::compiler::HWY_NAMESPACE {
 namespace {
 
-struct ColorFit {
-  Line line = {};
-  Steps steps = {};
-  float error = 1e30f;
+using Mode5Color = LineFormat<7, false, 3>;
+using Mode5Separate = LineFormat<8, false, 3>;
+using Mode4Color = LineFormat<5, false, 3>;
+using Mode4Separate = LineFormat<6, false, 7>;
+using Mode4ColorSecond = LineFormat<5, false, 7>;
+using Mode4SeparateSecond = LineFormat<6, false, 3>;
+
+// kLanes blocks whose channel `rotation` - 1 has changed places with channel 3, rotations by lane.
+struct Rotated {
+  alignas(32) float value[4][16][8];
+  alignas(32) float weight[4][16][8];
 };
 
-template <int Bits>
-ColorFit fitColor(const Plane& color, float levels, int passes) {
-  ColorFit best;
-  Line line = principalLine(color);
-  Steps steps = nearestSteps(color, line, levels);
-  for (int pass = 0; pass < passes; ++pass) {
-    line = leastSquaresLine(color, steps, levels, line);
-    const Line stored = {quantiseEnd<Bits>(line.first), quantiseEnd<Bits>(line.second)};
-    steps = nearestSteps(color, stored, levels);
-    const float error = sum(lineErrors(color, stored, steps, levels));
-    if (!(error < best.error)) break;
-    best = {stored, steps, error};
-  }
-  return best;
-}
-
-struct SeparateFit {
-  Segment segment = {};
-  Steps steps = {};
-  float error = 1e30f;
-};
-
-template <int Bits>
-SeparateFit fitSeparate(const Scalars& scalars, float levels, int passes) {
-  SeparateFit best;
-  Segment segment = scalarRange(scalars);
-  for (int pass = 0; pass < passes; ++pass) {
-    const Float4 ends = quantiseEnd<Bits>(clamp(Float4{segment.first, segment.second, 0, 0}, 0.0f, 255.0f));
-    const Segment stored = {ends[0], ends[1]};
-    Steps steps;
-    scalarSteps(scalars, stored, levels, steps.step);
-    Float4 position[4];
-    Float4 error = splat(0);
-    for (int r = 0; r < 4; ++r) {
-      const Float4 weight = round(steps.step[r] * splat(64.0f / levels));
-      const Float4 blend = splat(stored.first) * splat(64.0f) + weight * splat(stored.second - stored.first);
-      const Float4 difference = truncate((blend + splat(32.0f)) * splat(1.0f / 64.0f)) - scalars.value[r];
-      error += difference * difference * scalars.weight[r];
-      position[r] = weight * splat(1.0f / 64.0f);
+template <Weights kWeights>
+void rotate(const BlockTexels& texels, std::uint32_t lane, V rotation, Rotated& to) {
+  for (int i = 0; i < 16; ++i) {
+    V separate = load(&texels.value[3][i][lane]);
+    V separateWeight = all(1.0f);
+    if constexpr (kWeights == Weights::channel) separateWeight = load(&texels.weight[3][i][lane]);
+    const V value3 = separate;
+    const V weight3 = separateWeight;
+    for (int c = 0; c < 3; ++c) {
+      const M isSeparate = rotation == all(static_cast<float>(c + 1));
+      const V value = load(&texels.value[c][i][lane]);
+      store(select(isSeparate, value3, value), to.value[c][i]);
+      separate = select(isSeparate, value, separate);
+      if constexpr (kWeights == Weights::channel) {
+        const V weight = load(&texels.weight[c][i][lane]);
+        store(select(isSeparate, weight3, weight), to.weight[c][i]);
+        separateWeight = select(isSeparate, weight, separateWeight);
+      }
     }
-    const float total = sum(error);
-    if (!(total < best.error)) break;
-    best = {stored, steps, total};
-    segment = scalarLeastSquares(scalars, position, segment);
+    store(separate, to.value[3][i]);
+    if constexpr (kWeights == Weights::channel) store(separateWeight, to.weight[3][i]);
   }
-  return best;
 }
 
-// Channel 3 of a rotated plane as scalars, and the plane without it: a channel of zeros costs nothing.
-struct Split {
-  Plane color;
-  Scalars separate;
+template <int kChannels, Weights kWeights>
+struct Part {
+  Plane<kChannels, kWeights> plane;
+  Guesses<kChannels> guesses;
 
-  Split(const Plane& plane, std::uint32_t rotation) : color(plane) {
-    const std::uint32_t channel = rotation == 0 ? 3 : rotation - 1;
-    for (int r = 0; r < 4; ++r) {
-      separate.value[r] = plane.value[channel][r];
-      separate.weight[r] = plane.weight[channel][r];
-      color.value[channel][r] = plane.value[3][r];
-      color.weight[channel][r] = plane.weight[3][r];
-      color.value[3][r] = splat(0);
-      color.weight[3][r] = plane.weight[channel][r];
+  Part(const Rotated& rotated, int firstChannel, const Bc7Search& search) {
+    for (int c = 0; c < kChannels; ++c) {
+      plane.value[c] = rotated.value[firstChannel + c][0];
+      plane.weight[c] = rotated.weight[firstChannel + c][0];
     }
+    plane.sum();
+    guesses = guessEnds(plane, search);
   }
 };
 
-void keepBetter(std::uint32_t mode, std::uint32_t rotation, bool colorIsSecond, const ColorFit& color,
-                const SeparateFit& separate, Bc7Fit& best) {
-  const float error = color.error + separate.error;
-  if (!(error < best.error)) return;
-  best.mode = mode;
-  best.partition = 0;
-  best.rotation = rotation;
-  best.colorIsSecond = colorIsSecond;
-  best.line[0] = color.line;
-  best.line[0].first[3] = separate.segment.first;
-  best.line[0].second[3] = separate.segment.second;
-  best.steps = color.steps;
-  best.separateSteps = separate.steps;
-  best.error = error;
+HWY_INLINE void blend(M condition, V value, float* to) {
+  store(select(condition, value, load(to)), to);
 }
 
-void tryRotation(const Plane& plane, std::uint32_t rotation, const Bc7Search& search, Bc7Fit& best) {
-  const Split split(plane, rotation);
-  keepBetter(5, rotation, false, fitColor<7>(split.color, 3, search.passes),
-             fitSeparate<8>(split.separate, 3, search.passes), best);
+template <class ColorFormat, class SeparateFormat, Weights kWeights>
+void tryMode(const Part<3, kWeights>& color, const Part<1, kWeights>& separate, std::uint32_t lane, float mode,
+             V rotation, float colorIsSecond, const Bc7Search& search, Bc7Fits& fits) {
+  const LineFit<3> line = fitLine<ColorFormat>(color.plane, color.guesses, search);
+  const LineFit<1> segment = fitLine<SeparateFormat>(separate.plane, separate.guesses, search);
+  const V error = line.error + segment.error;
+  const M better = error < load(&fits.error[lane]);
+  if (!any(better)) return;
+  blend(better, all(mode), &fits.mode[lane]);
+  blend(better, rotation, &fits.rotation[lane]);
+  blend(better, all(colorIsSecond), &fits.colorIsSecond[lane]);
+  blend(better, error, &fits.error[lane]);
+  for (int c = 0; c < 4; ++c) {
+    blend(better, c < 3 ? line.ends.first[c] : segment.ends.first[0], &fits.first[0][c][lane]);
+    blend(better, c < 3 ? line.ends.second[c] : segment.ends.second[0], &fits.second[0][c][lane]);
+  }
+  const auto projectColor = projector(color.plane, line.ends);
+  const auto projectSeparate = projector(separate.plane, segment.ends);
+  for (int i = 0; i < 16; ++i) {
+    blend(better, stepAt(projectColor(i), ColorFormat::kLevels), &fits.step[i][lane]);
+    blend(better, stepAt(projectSeparate(i), SeparateFormat::kLevels), &fits.separateStep[i][lane]);
+  }
+}
+
+template <Weights kWeights>
+void tryRotation(const BlockTexels& texels, std::uint32_t lane, V rotation, const Bc7Search& search, Bc7Fits& fits) {
+  Rotated rotated;
+  rotate<kWeights>(texels, lane, rotation, rotated);
+  const Part<3, kWeights> color(rotated, 0, search);
+  const Part<1, kWeights> separate(rotated, 3, search);
+  tryMode<Mode5Color, Mode5Separate, kWeights>(color, separate, lane, 5, rotation, 0, search, fits);
   if (!search.mode4) return;
-  keepBetter(4, rotation, false, fitColor<5>(split.color, 3, search.passes),
-             fitSeparate<6>(split.separate, 7, search.passes), best);
-  keepBetter(4, rotation, true, fitColor<5>(split.color, 7, search.passes),
-             fitSeparate<6>(split.separate, 3, search.passes), best);
+  tryMode<Mode4Color, Mode4Separate, kWeights>(color, separate, lane, 4, rotation, 0, search, fits);
+  tryMode<Mode4ColorSecond, Mode4SeparateSecond, kWeights>(color, separate, lane, 4, rotation, 1, search, fits);
+}
+
+// The rotation that takes out the channel which one line, mode 6's, serves worst.
+template <Weights kWeights>
+V worstServed(const BlockTexels& texels, std::uint32_t lane, const Bc7Fits& fits) {
+  V worst = all(-1.0f);
+  V rotation = all(0.0f);
+  for (int c = 0; c < 4; ++c) {
+    const V first = load(&fits.first[0][c][lane]);
+    const V span = load(&fits.second[0][c][lane]) - first;
+    V error = all(0.0f);
+    for (int i = 0; i < 16; ++i) {
+      const V position = load(&fits.step[i][lane]) * all(1.0f / 15.0f);
+      const V difference = first + position * span - load(&texels.value[c][i][lane]);
+      V square = difference * difference;
+      if constexpr (kWeights == Weights::channel) square = square * load(&texels.weight[c][i][lane]);
+      error = error + square;
+    }
+    const M worse = error > worst;
+    worst = select(worse, error, worst);
+    rotation = select(worse, all(c == 3 ? 0.0f : static_cast<float>(c + 1)), rotation);
+  }
+  return rotation;
+}
+
+template <Weights kWeights>
+void tryLanes(const BlockTexels& texels, std::uint32_t lane, const Bc7Search& search, Bc7Fits& fits) {
+  if (search.rotations < 4) {
+    tryRotation<kWeights>(texels, lane, worstServed<kWeights>(texels, lane, fits), search, fits);
+    return;
+  }
+  for (int r = 0; r < 4; ++r) tryRotation<kWeights>(texels, lane, all(static_cast<float>(r)), search, fits);
+}
+
+void tryModes4And5(const BlockTexels& texels, const Bc7Search& search, Bc7Fits& fits) {
+  for (std::uint32_t lane = 0; lane < kBlockLanes; lane += kLanes) {
+    if (texels.allActive) {
+      tryLanes<Weights::none>(texels, lane, search, fits);
+    } else {
+      tryLanes<Weights::channel>(texels, lane, search, fits);
+    }
+  }
 }
 
 }  // namespace
+}  // namespace billow::compiler::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
 
-void tryModes4And5(const Plane& plane, const Bc7Search& search, Bc7Fit& best) {
-  if (search.rotations >= 4) {
-    for (std::uint32_t rotation = 0; rotation < 4; ++rotation) tryRotation(plane, rotation, search, best);
-    return;
-  }
-  // The channel that one line serves worst is the one to take out.
-  const Float4 errors = lineErrors(plane, best.line[0], best.steps, 15.0f);
-  std::uint32_t worst = 0;
-  for (std::uint32_t c = 1; c < 4; ++c) {
-    if (errors[c] > errors[worst]) worst = c;
-  }
-  tryRotation(plane, worst == 3 ? 0 : worst + 1, search, best);
+#if HWY_ONCE
+namespace billow::compiler {
+
+HWY_EXPORT(tryModes4And5);
+
+void tryModes4And5(const BlockTexels& texels, const Bc7Search& search, Bc7Fits& fits) {
+  HWY_DYNAMIC_DISPATCH(tryModes4And5)(texels, search, fits);
 }
 
 }  // namespace billow::compiler
+#endif  // HWY_ONCE

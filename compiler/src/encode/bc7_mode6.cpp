@@ -1,44 +1,59 @@
 // Mode 6: one line, 16 steps, ends of seven bits and a p-bit. The mode that most smooth blocks want.
-#include <initializer_list>
+#include "encode/bc7_block.h"
 
-#include "encode/bc7_lines.h"
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "encode/bc7_mode6.cpp"
+#include <hwy/foreach_target.h>
 
-namespace billow::compiler {
+#include "encode/bc7_fit-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace billow::compiler::HWY_NAMESPACE {
 namespace {
 
-constexpr float kLevels = 15.0f;
+using Mode6 = LineFormat<8, true, 15>;
 
-// Moves every channel of both ends by one stored step (two, as the p-bit stays) while that helps.
-void nudgeEnds(const Plane& plane, LineFit& best) {
-  for (int pass = 0; pass < 3; ++pass) {
-    const float before = best.error;
-    for (int c = 0; c < 4; ++c) {
-      for (const float by : {-2.0f, 2.0f}) {
-        Float4 change = splat(0);
-        change[c] = by;
-        for (const bool atFirst : {true, false}) {
-          Line line = best.line;
-          Float4& end = atFirst ? line.first : line.second;
-          end += change;
-          if (end[c] >= 0.0f && end[c] <= 255.0f) tryLine(plane, line, kLevels, best);
-        }
-      }
+template <Weights kWeights>
+void fitLanes(const BlockTexels& texels, std::uint32_t lane, const Bc7Search& search, Bc7Fits& fits) {
+  Plane<4, kWeights> plane;
+  for (int c = 0; c < 4; ++c) {
+    plane.value[c] = &texels.value[c][0][lane];
+    plane.weight[c] = &texels.weight[c][0][lane];
+  }
+  plane.sum();
+  const LineFit<4> fit = fitLine<Mode6>(plane, guessEnds(plane, search), search);
+  for (int c = 0; c < 4; ++c) {
+    store(fit.ends.first[c], &fits.first[0][c][lane]);
+    store(fit.ends.second[c], &fits.second[0][c][lane]);
+  }
+  const auto project = projector(plane, fit.ends);
+  for (int i = 0; i < 16; ++i) store(stepAt(project(i), Mode6::kLevels), &fits.step[i][lane]);
+  store(fit.error, &fits.error[lane]);
+  store(all(6.0f), &fits.mode[lane]);
+}
+
+void fitMode6(const BlockTexels& texels, const Bc7Search& search, Bc7Fits& fits) {
+  for (std::uint32_t lane = 0; lane < kBlockLanes; lane += kLanes) {
+    if (texels.allActive) {
+      fitLanes<Weights::none>(texels, lane, search, fits);
+    } else {
+      fitLanes<Weights::channel>(texels, lane, search, fits);
     }
-    if (!(best.error < before)) break;
   }
 }
 
 }  // namespace
+}  // namespace billow::compiler::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
 
-Bc7Fit fitMode6(const Plane& plane, const Bc7Search& search) {
-  LineFit best = fitLineWithP<8>(plane, kLevels, search);
-  if (search.nudge) nudgeEnds(plane, best);
-  Bc7Fit fit;
-  fit.mode = 6;
-  fit.line[0] = best.line;
-  fit.steps = best.steps;
-  fit.error = best.error;
-  return fit;
+#if HWY_ONCE
+namespace billow::compiler {
+
+HWY_EXPORT(fitMode6);
+
+void fitMode6(const BlockTexels& texels, const Bc7Search& search, Bc7Fits& fits) {
+  HWY_DYNAMIC_DISPATCH(fitMode6)(texels, search, fits);
 }
 
 }  // namespace billow::compiler
+#endif  // HWY_ONCE

@@ -1,7 +1,7 @@
 // BC7 bricks: eight blocks of 16 texels, four slices of the packed axis in a texel's channels.
+#include <cmath>
+
 #include "encode/bc7_block.h"
-#include "encode/stored_order.h"
-#include "encode/wide/wide_encoder.h"
 
 namespace billow::compiler {
 namespace {
@@ -9,131 +9,131 @@ namespace {
 constexpr std::uint32_t kBlocks = 8;
 constexpr std::uint32_t kBlockBytes = 16;
 
-struct BrickFit {
-  Bc7Fit block[kBlocks];
-  float error = 0;
-};
-
-void fitWithMode6(const StoredBrick& stored, const Bc7Search& search, BrickFit& fit) {
-  fit.error = 0;
-  for (std::uint32_t b = 0; b < kBlocks; ++b) {
-    fit.block[b] = fitMode6(stored.plane(b), search);
-    fit.error += fit.block[b].error;
-  }
-}
-
-// Where one packed axis alone is pursued, mode 6 is fitted to all blocks at once.
-bool isQuick(const Bc7Search& search) {
-  return !search.everyAxis;
-}
-
 std::uint32_t axisOf(std::uint32_t i) {
   return format::packedAxis(format::kEncodingBc7Z + i);
 }
 
-// The sum of errors.
-float quickFit(const BrickTargets& targets, std::uint32_t axis, const Bc7Search& search, WideMode6& fit) {
-  WideBrick arranged;
-  wideEncoder().arrange(targets, axis, arranged);
-  return wideEncoder().fitMode6(arranged, search.passes, fit);
+float totalError(const Bc7Fits& fits) {
+  float total = 0;
+  for (const float error : fits.error) total += error;
+  return total;
 }
 
-void take(const WideMode6& from, BrickFit& fit) {
-  fit.error = 0;
-  for (std::uint32_t b = 0; b < kBlocks; ++b) {
-    Bc7Fit& block = fit.block[b];
-    block = Bc7Fit{};
-    for (std::uint32_t c = 0; c < 4; ++c) {
-      block.line[0].first[c] = from.first[c][b];
-      block.line[0].second[c] = from.second[c][b];
-    }
-    for (std::uint32_t i = 0; i < 16; ++i) block.steps.step[i >> 2][i & 3] = from.step[i][b];
-    block.error = from.error[b];
-    fit.error += block.error;
-  }
-}
-
-// Of the three encodings the one that mode 6 serves best after one pass, and its fit after all.
-std::uint32_t quickBestAxis(const BrickTargets& targets, const Bc7Search& search, BrickFit& fit) {
-  WideBrick arranged[3];
-  WideMode6 mode6;
+// Of the three encodings the one that mode 6 serves best at its least effort.
+std::uint32_t promisingAxis(const BlockTexels arranged[3]) {
   std::uint32_t best = 0;
   float least = 0;
   for (std::uint32_t i = 0; i < 3; ++i) {
-    wideEncoder().arrange(targets, axisOf(i), arranged[i]);
-    const float error = wideEncoder().fitMode6(arranged[i], 1, mode6);
+    Bc7Fits fits;
+    fitMode6(arranged[i], Bc7Search{}, fits);
+    const float error = totalError(fits);
     if (i == 0 || error < least) {
       least = error;
       best = i;
     }
   }
-  wideEncoder().fitMode6(arranged[best], search.passes, mode6);
-  take(mode6, fit);
   return best;
 }
 
-void improve(const StoredBrick& stored, const Bc7Search& search, BrickFit& fit) {
-  fit.error = 0;
-  for (std::uint32_t b = 0; b < kBlocks; ++b) {
-    tryOtherModes(stored.plane(b), search, fit.block[b]);
-    fit.error += fit.block[b].error;
-  }
+void fitBlocks(const BlockTexels& texels, const Bc7Search& search, Bc7Fits& fits) {
+  fitMode6(texels, search, fits);
+  if (search.rotations > 0 && totalError(fits) > 0) tryModes4And5(texels, search, fits);
+  if (search.partitions > 0 && totalError(fits) > 0) tryMode7(texels, search, fits);
 }
 
-std::uint32_t leastError(const BrickFit fits[3]) {
-  std::uint32_t least = 0;
-  for (std::uint32_t i = 1; i < 3; ++i) {
-    if (fits[i].error < fits[least].error) least = i;
-  }
-  return least;
-}
-
-void store(const BrickSource& brick, std::uint32_t encoding, TexelRange range, const BrickFit& fit, Candidate& out) {
+// Fills `out`; `texels` are what its blocks decode to.
+void store(const BrickSource& brick, std::uint32_t encoding, TexelRange range, const Bc7Fits& fits,
+           format::Texels& texels, Candidate& out) {
   out.encoding = encoding;
   out.texelMask = false;
   out.lo = range.lo;
   out.scale = range.scale;
-  for (std::uint32_t b = 0; b < kBlocks; ++b) packBlock(fit.block[b], &out.payload[b * kBlockBytes]);
-  format::Texels texels;
+  for (std::uint32_t b = 0; b < kBlocks; ++b) packBlock(fits, b, &out.payload[b * kBlockBytes]);
   format::decodeTexels(encoding, {out.payload.data(), kBlocks * kBlockBytes}, texels);
-  wideEncoder().measure(brick, texels, out);
+  measure(brick, texels, out);
+}
+
+// The lo and scale with which these texels come nearest to the active voxels: a linear regression. Those of `fallback`
+// where it has no solution that a pack may hold.
+TexelRange solveRange(const BrickSource& brick, const format::Texels& texels, TexelRange fallback) {
+  double count = 0, sumT = 0, sumTT = 0, sumV = 0, sumTV = 0;
+  for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) {
+    if (!format::maskBit(*brick.active, i)) continue;
+    const double t = texels[i];
+    // About lo, for the sake of precision.
+    const double v = static_cast<double>((*brick.values)[i]) - static_cast<double>(fallback.lo);
+    count += 1;
+    sumT += t;
+    sumTT += t * t;
+    sumV += v;
+    sumTV += t * v;
+  }
+  const double determinant = count * sumTT - sumT * sumT;
+  if (!(determinant > 0)) return fallback;
+  const double scale = (count * sumTV - sumT * sumV) / determinant;
+  const double lo = (sumV - scale * sumT) / count + static_cast<double>(fallback.lo);
+  const TexelRange range = {static_cast<float>(lo), static_cast<float>(scale)};
+  const bool usable =
+      range.scale > 0 && std::isfinite(range.lo) && std::isfinite(format::reconstruct(range.lo, range.scale, 255));
+  return usable ? range : fallback;
+}
+
+// The blocks and the brick's range in turns: each makes the other's best anew.
+void solveTogether(const BrickSource& brick, const Bc7Search& search, format::Texels& texels, Candidate& out) {
+  const std::uint32_t axis = format::packedAxis(out.encoding);
+  for (int round = 0; round < search.ranges && out.squaredError > 0; ++round) {
+    Candidate solved = out;
+    const TexelRange range = solveRange(brick, texels, {out.lo, out.scale});
+    solved.lo = range.lo;
+    solved.scale = range.scale;
+    measure(brick, texels, solved);
+    if (solved.squaredError < out.squaredError) out = solved;
+    const BrickTargets targets(brick, range);
+    BlockTexels arranged;
+    arrange(targets, axis, arranged);
+    Bc7Fits fits;
+    fitBlocks(arranged, search, fits);
+    store(brick, out.encoding, range, fits, texels, solved);
+    if (!(solved.squaredError < out.squaredError)) return;
+    out = solved;
+  }
+}
+
+void encodeAxis(const BrickSource& brick, const BrickTargets& targets, std::uint32_t encoding, const Bc7Search& search,
+                Candidate& out) {
+  BlockTexels arranged;
+  arrange(targets, format::packedAxis(encoding), arranged);
+  Bc7Fits fits;
+  fitBlocks(arranged, search, fits);
+  format::Texels texels;
+  store(brick, encoding, targets.range, fits, texels, out);
+  solveTogether(brick, search, texels, out);
 }
 
 }  // namespace
 
 void encodeBc7(const BrickSource& brick, std::uint32_t encoding, int effort, Candidate& out) {
-  const BrickTargets targets(brick);
-  const Bc7Search search = bc7Search(effort);
-  const std::uint32_t axis = format::packedAxis(encoding);
-  BrickFit fit;
-  if (isQuick(search)) {
-    WideMode6 mode6;
-    quickFit(targets, axis, search, mode6);
-    take(mode6, fit);
-  } else {
-    fitWithMode6(StoredBrick(targets, axis), search, fit);
-  }
-  improve(StoredBrick(targets, axis), search, fit);
-  store(brick, encoding, targets.range, fit, out);
+  encodeAxis(brick, BrickTargets(brick), encoding, bc7Search(effort), out);
 }
 
 void encodeBc7BestAxis(const BrickSource& brick, int effort, Candidate& out) {
   const BrickTargets targets(brick);
   const Bc7Search search = bc7Search(effort);
-  BrickFit fit[3];
-  if (isQuick(search)) {
-    const std::uint32_t promising = quickBestAxis(targets, search, fit[0]);
-    improve(StoredBrick(targets, axisOf(promising)), search, fit[0]);
-    store(brick, format::kEncodingBc7Z + promising, targets.range, fit[0], out);
+  if (!search.everyAxis) {
+    BlockTexels arranged[3];
+    for (std::uint32_t i = 0; i < 3; ++i) arrange(targets, axisOf(i), arranged[i]);
+    const std::uint32_t best = promisingAxis(arranged);
+    Bc7Fits fits;
+    fitBlocks(arranged[best], search, fits);
+    format::Texels texels;
+    store(brick, format::kEncodingBc7Z + best, targets.range, fits, texels, out);
     return;
   }
   for (std::uint32_t i = 0; i < 3; ++i) {
-    const StoredBrick stored(targets, axisOf(i));
-    fitWithMode6(stored, search, fit[i]);
-    improve(stored, search, fit[i]);
+    Candidate candidate;
+    encodeAxis(brick, targets, format::kEncodingBc7Z + i, search, candidate);
+    if (i == 0 || candidate.squaredError < out.squaredError) out = candidate;
   }
-  const std::uint32_t best = leastError(fit);
-  store(brick, format::kEncodingBc7Z + best, targets.range, fit[best], out);
 }
 
 }  // namespace billow::compiler
