@@ -164,8 +164,10 @@ float voxelTexel(Record record, uvec3 v, inout uint index) {
 float recordVoxel(uint g, Record record, uvec3 v) {
   uint index = 0u;
   const float texel = voxelTexel(record, v, index);
-  const bool inactive = record.mask == kMaskTexel ? index == 0u : record.mask != kMaskAll && !maskBit(g, record.mask, v);
-  if (inactive) return params.grids[g].boxMin.w;
+  bool present = true;
+  if (record.mask == kMaskTexel) present = index != 0u;
+  if (record.mask < kMaskTexel) present = maskBit(g, record.mask, v);
+  if (!present) return params.grids[g].boxMin.w;
   precise const float product = record.scale * texel;
   precise const float value = record.lo + product;
   return value;
