@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "command.h"
+#include "encoding_keys.h"
 #include "import_options.h"
 #include "progress.h"
 
@@ -31,19 +32,20 @@ std::string psnrText(double psnr) {
   return std::isfinite(psnr) ? fmt::format("{:.2f} dB", psnr) : "exact";
 }
 
-const char* const kEncodingNames[format::kEncodingCount] = {"constant", "bc7z", "bc7y", "bc7x", "bc4z",
-                                                            "bc4y",     "bc4x", "r8",   "r16"};
-
 std::string bricksText(const compiler::GridReport& grid) {
-  const auto& b = grid.bricks;
-  return fmt::format("{} / {} / {} / {} / {}", b[0], b[1] + b[2] + b[3], b[4] + b[5] + b[6], b[7], b[8]);
+  std::array<std::uint64_t, format::kBrickClassCount> classes{};
+  for (std::uint32_t e = 1; e < format::kEncodingCount; ++e) {
+    classes[static_cast<std::uint32_t>(format::brickClass(e))] += grid.bricks[e];
+  }
+  return fmt::format("{} / {} / {} / {} / {}", grid.bricks[format::kEncodingConstant], classes[0], classes[1],
+                     classes[2], classes[3]);
 }
 
 void printReport(const compiler::CompileReport& report, const std::string& output) {
   fmt::print("{}: {} frame{}, {:.2f} MB\n", output, report.frames, report.frames == 1 ? "" : "s",
              static_cast<double>(report.fileBytes) * 1e-6);
   fmt::print("{:<24} {:>6} {:>13} {:>10} {:>12} {:>12}   {}\n", "grid", "frames", "active voxels", "worst PSNR",
-             "max error", "GPU/frame", "bricks: constant / BC7 / BC4 / R8 / R16");
+             "max error", "GPU/frame", "bricks: constant / BC7 / uniform / local / coarse");
   for (const compiler::GridReport& grid : report.grids) {
     const std::string name = grid.volume.empty() ? grid.grid : grid.volume + "/" + grid.grid;
     fmt::print("{:<24} {:>6} {:>13} {:>10} {:>12.4g} {:>9.1f} KB   {}\n", name, grid.frames, grid.activeVoxels,
@@ -67,7 +69,7 @@ nlohmann::ordered_json reportJson(const compiler::CompileReport& report, const s
     row["worstPsnr"] = std::isfinite(grid.worstPsnr) ? nlohmann::ordered_json(grid.worstPsnr) : nullptr;
     row["maxError"] = grid.maxError;
     row["largestFrameGpuBytes"] = grid.largestFrameGpuBytes;
-    for (std::size_t e = 0; e < grid.bricks.size(); ++e) row["bricks"][kEncodingNames[e]] = grid.bricks[e];
+    for (std::size_t e = 0; e < grid.bricks.size(); ++e) row["bricks"][kEncodingKeys[e]] = grid.bricks[e];
     json["grids"].push_back(row);
   }
   return json;

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "command.h"
+#include "encoding_keys.h"
 #include "pack_summary.h"
 
 namespace billow::command {
@@ -13,9 +14,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kStreamNames[format::kStreamCount] = {"bricks", "masks", "node5", "node4", "node3", "children"};
-constexpr const char* kEncodingNames[format::kEncodingCount] = {"constant", "bc7z", "bc7y", "bc7x", "bc4z",
-                                                                "bc4y",     "bc4x", "r8",   "r16"};
-constexpr const char* kClassNames[format::kBrickClassCount] = {"bc7", "bc4", "r8", "r16"};
+constexpr const char* kClassNames[format::kBrickClassCount] = {"bc7", "uniform", "local", "coarse"};
 
 Json toJson(const format::GpuBytes& gpu) {
   Json json;
@@ -77,7 +76,7 @@ Json toJson(const PackSummary& pack) {
   json["pages"]["count"] = pack.pageCount;
   json["pages"]["rawBytes"] = pack.rawPageBytes;
   for (std::uint32_t i = 0; i < format::kStreamCount; ++i) json["pages"][kStreamNames[i]] = pack.rawByStream[i];
-  for (std::uint32_t i = 0; i < format::kEncodingCount; ++i) json["encodings"][kEncodingNames[i]] = pack.encodings[i];
+  for (std::uint32_t i = 0; i < format::kEncodingCount; ++i) json["encodings"][kEncodingKeys[i]] = pack.encodings[i];
   const Json info = Json::parse(pack.infoJson, nullptr, false);
   json["info"] = pack.infoJson.empty() ? Json(nullptr) : info.is_discarded() ? Json(pack.infoJson) : info;
   json["volumes"] = Json::array();
@@ -159,7 +158,7 @@ void printText(const PackSummary& pack) {
              size(pack.storedPageBytes), size(pack.rawPageBytes), size(pack.tableBytes));
   std::string encodings;
   for (std::uint32_t i = 0; i < format::kEncodingCount; ++i) {
-    if (pack.encodings[i] > 0) encodings += fmt::format("  {} {}", kEncodingNames[i], pack.encodings[i]);
+    if (pack.encodings[i] > 0) encodings += fmt::format("  {} {}", kEncodingKeys[i], pack.encodings[i]);
   }
   if (!encodings.empty()) fmt::print("Bricks by encoding, over all frames:{}\n", encodings);
   for (const VolumeSummary& volume : pack.volumes) {

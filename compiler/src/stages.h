@@ -117,15 +117,18 @@ ImportedFrame importFrame(const PlannedVolume& volume, const PlannedFrame& frame
 
 // ---- encode: one brick, one encoding.
 
-// The candidate's values are lo + scale * texel; squaredError and maxError are measured against the source over active
-// voxels, with the very arithmetic of format::decodeBrick.
-struct Candidate {
+// How an encoding serves a brick: values are lo + scale * texel; squaredError and maxError are measured against the
+// source over active voxels, with the very arithmetic of format::decodeBrick.
+struct Fit {
   std::uint32_t encoding = format::kEncodingConstant;
-  bool texelMask = false;  // inactive voxels are texel 0 (R8, R16): no mask is stored
+  bool texelMask = false;  // inactive voxels have index 0, active ones another (uniform, local): no mask is stored
   float lo = 0;
   float scale = 0;
   double squaredError = 0;
   float maxError = 0;
+};
+
+struct Candidate : Fit {
   std::array<std::byte, 1024> payload;  // format::brickBytes(encoding) of it are used
 };
 
@@ -140,12 +143,17 @@ struct BrickSource {
 // Deterministic, thread-safe, no allocation.
 void encodeConstant(const BrickSource& brick, Candidate& out);
 void encodeBc7(const BrickSource& brick, std::uint32_t encoding, int effort, Candidate& out);
-void encodeBc4(const BrickSource& brick, std::uint32_t encoding, Candidate& out);
 // The packed axis that fits best is found by a cheap test, and only that one is encoded in full.
 void encodeBc7BestAxis(const BrickSource& brick, int effort, Candidate& out);
-void encodeBc4BestAxis(const BrickSource& brick, Candidate& out);
-void encodeR8(const BrickSource& brick, Candidate& out);
-void encodeR16(const BrickSource& brick, Candidate& out);
+// Of `bits` 1 to 8, or 16.
+void encodeUniform(const BrickSource& brick, std::uint32_t bits, Candidate& out);
+// What encodeUniform() will do with 1 to 8 bits, all at once; fits[i] has i + 1.
+void fitUniforms(const BrickSource& brick, std::array<Fit, 8>& fits);
+// Of `bits` 2 to 6.
+void encodeLocal(const BrickSource& brick, std::uint32_t bits, Candidate& out);
+// The squared errors that local bricks of 2 to 6 bits would have if values filled their cells' ranges evenly.
+std::array<double, 5> estimateLocals(const BrickSource& brick);
+void encodeCoarse(const BrickSource& brick, Candidate& out);
 
 }  // namespace billow::compiler
 

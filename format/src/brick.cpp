@@ -84,10 +84,26 @@ std::uint32_t coarseTexel(const std::byte* bytes, std::uint32_t x, std::uint32_t
   return sum;
 }
 
-void decodeCoarse(const std::byte* bytes, Texels& texels) {
-  for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
-    texels[i] = static_cast<std::uint16_t>(coarseTexel(bytes, i >> 6, i >> 3 & 7, i & 7));
+// Four items an axis become eight, `inner` numbers apart, `outer` times over: coarseTexel's sum, an axis at a time.
+void expandAxis(const std::uint16_t* from, std::uint32_t outer, std::uint32_t inner, std::uint16_t* to) {
+  for (std::uint32_t o = 0; o < outer; ++o, from += 4 * inner) {
+    for (std::uint32_t voxel = 0; voxel < 8; ++voxel) {
+      const Taps taps = coarseTaps(voxel);
+      for (std::uint32_t i = 0; i < inner; ++i) {
+        const std::uint32_t sum =
+            taps.weight[0] * from[taps.at[0] * inner + i] + taps.weight[1] * from[taps.at[1] * inner + i];
+        *to++ = static_cast<std::uint16_t>(sum);
+      }
+    }
   }
+}
+
+void decodeCoarse(const std::byte* bytes, Texels& texels) {
+  std::uint16_t points[4 * 4 * 4], x[8 * 4 * 4], y[8 * 8 * 4];
+  for (std::uint32_t i = 0; i < 64; ++i) points[i] = std::to_integer<std::uint16_t>(bytes[i]);
+  expandAxis(points, 1, 16, x);
+  expandAxis(x, 8, 4, y);
+  expandAxis(y, 64, 1, texels.data());
 }
 
 std::uint32_t bc7Texel(std::uint32_t encoding, const std::byte* bytes, std::array<std::uint32_t, 3> at) {

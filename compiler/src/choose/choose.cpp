@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <memory>
@@ -28,21 +29,14 @@ constexpr int kFullEffort = 3;
 // Bytes that a stored mask adds beside a brick (spec: Mask3).
 constexpr std::uint32_t kMaskBytes = sizeof(format::Mask3);
 
-// Constant, R8, BC4, BC7 and BC7 again, and what their payloads take: room for them is made at once.
-constexpr std::size_t kUsualChoices = 5;
-constexpr std::size_t kUsualPayload = 512 + 256 + 128 + 128;
+// Constant, uniform 1 to 8, some of local and coarse, BC7 and BC7 again: room for them is made at once.
+constexpr std::size_t kUsualChoices = 14;
 
-// A tried encoding whose payload lies in the brick's arena.
-struct Tried {
-  std::uint32_t encoding;
-  bool texelMask;
-  float lo, scale;
-  std::uint32_t payloadBegin;
-};
+constexpr std::uint32_t kBc7Bytes = 128;
 
 struct BrickTrials {
-  std::vector<Tried> tried;  // beside the brick's choices
-  std::vector<std::byte> arena;
+  std::vector<Fit> tried;      // beside the brick's choices
+  std::vector<std::byte> bc7;  // payloads of those that are BC7, in their order; others are encoded again when taken
 };
 
 // The grid frame's size but for its bricks and masks: what the index and the nodes need, sharing left out.
@@ -112,44 +106,64 @@ class GridChooser {
     }
   }
 
-  void tryR8() {
-    forEachBrick([this](std::size_t i, Candidate& candidate) {
+  void tryUniform() {
+    forEachBrick([this](std::size_t i, Candidate&) {
       if (quiet_[i]) return;
-      encodeR8(source(i), candidate);
-      add(i, candidate);
+      std::array<Fit, 8> fits;
+      fitUniforms(source(i), fits);
+      // With one bit that says which voxels are active nothing is left: that is a constant.
+      const std::size_t first = fits[0].texelMask ? 1 : 0;
+      for (std::size_t f = first; f < fits.size(); ++f) add(i, fits[f]);
     });
   }
 
-  // BC4 and BC7 are dear to try, so they are left out where they cannot pay: the mix so far has a Lagrange multiplier
+  // The others are dear to try, so they are left out where they cannot pay: the mix so far has a Lagrange multiplier
   // at the PSNR asked, and a brick is passed over where even an optimistic guess of the new encoding's error loses
   // against the brick's other choices at that multiplier, halved and doubled (the final one differs a little).
-  void tryBc4(std::optional<double> psnr) {
-    constexpr double kOptimism = 1;  // of R8's error, with half of its bits
+  void tryLocal(std::optional<double> psnr) {
+    constexpr double kOptimism = 0.5;  // of the error of values that fill their cells' ranges evenly
     const auto multiplier = multiplierAt(psnr);
     forEachBrick([&](std::size_t i, Candidate& candidate) {
-      if (quiet_[i] || !mayPay(i, 256, choices_[i][1].squaredError * kOptimism, multiplier)) return;
-      encodeBc4BestAxis(source(i), candidate);
+      if (quiet_[i]) return;
+      const std::array<double, 5> guesses = estimateLocals(source(i));
+      for (std::uint32_t bits = 2; bits <= 6; ++bits) {
+        const std::uint32_t bytes = *format::brickBytes(format::localEncoding(bits));
+        if (!mayPay(i, bytes, guesses[bits - 2] * kOptimism, multiplier)) continue;
+        encodeLocal(source(i), bits, candidate);
+        add(i, candidate);
+      }
+    });
+  }
+
+  void tryCoarse(std::optional<double> psnr) {
+    const auto multiplier = multiplierAt(psnr);
+    forEachBrick([&](std::size_t i, Candidate& candidate) {
+      if (quiet_[i] || !mayPay(i, 64 + maskBytes(i), 0, multiplier)) return;
+      encodeCoarse(source(i), candidate);
       add(i, candidate);
     });
   }
 
   void tryBc7(std::optional<double> psnr) {
-    constexpr double kOptimism = 1.5;  // of BC4's error, with half of its bits
+    constexpr double kOptimism = 0.3;  // of the error of uniform bricks with as many bits
     const auto multiplier = multiplierAt(psnr);
     const int effort = refinesBc7(psnr) ? 0 : quality_.effort;
     forEachBrick([&](std::size_t i, Candidate& candidate) {
-      if (quiet_[i] || choices_[i].size() < 3) return;
-      if (!mayPay(i, 128, choices_[i][2].squaredError * kOptimism, multiplier)) return;
+      if (quiet_[i]) return;
+      const auto& tried = bricks_[i].tried;
+      const auto two = std::find_if(tried.begin(), tried.end(),
+                                    [](const Fit& fit) { return fit.encoding == format::uniformEncoding(2); });
+      if (!mayPay(i, kBc7Bytes + maskBytes(i), two->squaredError * kOptimism, multiplier)) return;
       encodeBc7BestAxis(source(i), effort, candidate);
       add(i, candidate);
     });
     if (refinesBc7(psnr)) refineBc7(psnr);
   }
 
-  void tryR16() {
-    if (std::exchange(r16Tried_, true)) return;
+  void tryUniform16() {
+    if (std::exchange(uniform16Tried_, true)) return;
     forEachBrick([this](std::size_t i, Candidate& candidate) {
-      encodeR16(source(i), candidate);
+      encodeUniform(source(i), 16, candidate);
       add(i, candidate);
     });
   }
@@ -162,7 +176,7 @@ class GridChooser {
   std::vector<std::uint32_t> solveOrThrow(std::optional<double> psnr, const std::string& where) {
     auto chosen = solve(psnr);
     if (!chosen) {
-      tryR16();
+      tryUniform16();
       chosen = solve(psnr);
     }
     if (!chosen) {
@@ -176,9 +190,9 @@ class GridChooser {
   std::uint64_t gpuBytes(const std::vector<std::uint32_t>& chosen, const std::string& where) const {
     format::GridFrame frame = shape(grid_, where);
     for (std::size_t i = 0; i < bricks_.size(); ++i) {
-      const Tried& tried = bricks_[i].tried[chosen[i]];
-      format::countBrick(frame, tried.encoding);
-      if (!tried.texelMask && counts_[i] != format::kBrickVoxels) ++frame.maskCount;
+      const Fit& fit = bricks_[i].tried[chosen[i]];
+      format::countBrick(frame, fit.encoding);
+      if (!fit.texelMask && counts_[i] != format::kBrickVoxels) ++frame.maskCount;
     }
     return format::gpuBytes(frame).total();
   }
@@ -202,13 +216,9 @@ class GridChooser {
   ChosenGrid take(const std::vector<std::uint32_t>& chosen) {
     ChosenGrid result;
     result.bricks.resize(bricks_.size());
+    forEachBrick([&](std::size_t i, Candidate& candidate) { takeBrick(i, chosen[i], candidate, result.bricks[i]); });
     for (std::size_t i = 0; i < bricks_.size(); ++i) {
-      const Tried& tried = bricks_[i].tried[chosen[i]];
       const Choice& choice = choices_[i][chosen[i]];
-      ChosenBrick& brick = result.bricks[i];
-      brick = {tried.encoding, tried.texelMask, tried.lo, tried.scale, {}};
-      const auto begin = bricks_[i].arena.begin() + tried.payloadBegin;
-      brick.payload.assign(begin, begin + *format::brickBytes(tried.encoding));
       result.squaredError += choice.squaredError;
       result.maxError = std::max(result.maxError, choice.maxError);
     }
@@ -228,6 +238,27 @@ class GridChooser {
   BrickSource source(std::size_t i) const {
     return {&grid_.leaves[i].values, &grid_.leaves[i].active, counts_[i], grid_.background};
   }
+  void takeBrick(std::size_t i, std::uint32_t choice, Candidate& candidate, ChosenBrick& brick) const {
+    const BrickTrials& trials = bricks_[i];
+    const Fit& fit = trials.tried[choice];
+    const std::uint32_t bits = format::indexBits(fit.encoding);
+    const std::byte* payload = candidate.payload.data();
+    if (format::isBc7(fit.encoding)) {
+      const auto before = std::count_if(trials.tried.begin(), trials.tried.begin() + choice,
+                                        [](const Fit& other) { return format::isBc7(other.encoding); });
+      payload = trials.bc7.data() + before * kBc7Bytes;
+    } else if (format::isLocal(fit.encoding)) {
+      encodeLocal(source(i), bits, candidate);
+    } else if (fit.encoding == format::kEncodingCoarse) {
+      encodeCoarse(source(i), candidate);
+    } else if (bits != 0) {
+      encodeUniform(source(i), bits, candidate);
+    }
+    brick = {fit.encoding, fit.texelMask, fit.lo, fit.scale, {}};
+    brick.payload.assign(payload, payload + *format::brickBytes(fit.encoding));
+  }
+  // What a stored mask adds to brick i.
+  std::uint32_t maskBytes(std::size_t i) const { return counts_[i] == format::kBrickVoxels ? 0 : kMaskBytes; }
   // Squared error that a byte saves at the margin in the mix so far, outliers allowed; and the largest error that
   // counts.
   struct Margin {
@@ -243,9 +274,8 @@ class GridChooser {
   // Could an encoding of `bytes` with this error win on brick i? Always where the margin is not known.
   bool mayPay(std::size_t i, std::uint32_t bytes, double squaredError, const std::optional<Margin>& margin) const {
     if (!margin) return true;
-    const std::uint32_t mask = counts_[i] == format::kBrickVoxels ? 0 : kMaskBytes;
     for (const double multiplier : {margin->multiplier * 0.5, margin->multiplier * 2}) {
-      const double hoped = squaredError + multiplier * (bytes + mask);
+      const double hoped = squaredError + multiplier * bytes;
       const auto wins = [&](const Choice& other) {
         return other.maxError > margin->limit || hoped < other.squaredError + multiplier * other.bytes;
       };
@@ -271,16 +301,18 @@ class GridChooser {
   }
 
   void add(std::size_t i, const Candidate& candidate) {
-    const std::uint32_t bytes = *format::brickBytes(candidate.encoding);
-    const bool stored = counts_[i] != format::kBrickVoxels && !candidate.texelMask;
-    if (choices_[i].empty()) choices_[i].reserve(kUsualChoices);
-    choices_[i].push_back({bytes + (stored ? kMaskBytes : 0), candidate.squaredError, candidate.maxError});
-    BrickTrials& brick = bricks_[i];
-    if (brick.tried.empty()) brick.tried.reserve(kUsualChoices);
-    if (brick.arena.empty() && bytes != 0) brick.arena.reserve(kUsualPayload);
-    brick.tried.push_back({candidate.encoding, candidate.texelMask, candidate.lo, candidate.scale,
-                           static_cast<std::uint32_t>(brick.arena.size())});
-    brick.arena.insert(brick.arena.end(), candidate.payload.begin(), candidate.payload.begin() + bytes);
+    add(i, static_cast<const Fit&>(candidate));
+    if (!format::isBc7(candidate.encoding)) return;
+    bricks_[i].bc7.insert(bricks_[i].bc7.end(), candidate.payload.begin(), candidate.payload.begin() + kBc7Bytes);
+  }
+  void add(std::size_t i, const Fit& fit) {
+    if (choices_[i].size() == 1) {
+      choices_[i].reserve(kUsualChoices);
+      bricks_[i].tried.reserve(kUsualChoices);
+    }
+    const std::uint32_t bytes = *format::brickBytes(fit.encoding) + (fit.texelMask ? 0 : maskBytes(i));
+    choices_[i].push_back({bytes, fit.squaredError, fit.maxError});
+    bricks_[i].tried.push_back(fit);
   }
   template <class Function>
   void forEachBrick(const Function& function) {
@@ -296,7 +328,7 @@ class GridChooser {
   std::vector<std::vector<Choice>> choices_;
   std::vector<std::uint32_t> counts_;
   std::vector<char> quiet_;
-  bool r16Tried_ = false;
+  bool uniform16Tried_ = false;
 };
 
 // The best PSNR, the same for every grid, at which the frame fits the budget; bisected on 1/64 dB. Sharing one PSNR is
@@ -353,10 +385,11 @@ std::vector<ChosenGrid> chooseEncodings(std::span<const ImportedGrid> grids, con
     choosers[g] = std::make_unique<GridChooser>(grids[g], quality);
     choosers[g]->tryConstants();
     choosers[g]->settleQuietBricks(quality.psnr);
-    choosers[g]->tryR8();
-    choosers[g]->tryBc4(quality.psnr);
+    choosers[g]->tryUniform();
+    choosers[g]->tryLocal(quality.psnr);
+    choosers[g]->tryCoarse(quality.psnr);
     choosers[g]->tryBc7(quality.psnr);
-    if (quality.maxError) choosers[g]->tryR16();
+    if (quality.maxError) choosers[g]->tryUniform16();
   }
   std::vector<std::vector<std::uint32_t>> chosen(grids.size());
   if (quality.gpuBudget) chosen = fitBudget(choosers, quality, tileBytes, where);

@@ -22,6 +22,12 @@ struct TexelRange {
 // covered and is cut above. scale is 0 where the range is empty. lo may be -infinity where `first` is not 0.
 TexelRange coverRange(ValueRange range, std::uint32_t first, std::uint32_t last);
 
+// The same numbers with as many low bits of their mantissas 0, up to 16, as move no value lo + scale * [0, last] by
+// more than `tolerance`: they weigh less on disk. `lo` and `lo + scale * last` are finite in single precision.
+TexelRange shorten(double lo, double scale, std::uint32_t last, double tolerance);
+// As shorten() of a single number.
+float shorten(double value, double tolerance);
+
 // By voxelIndex: where a voxel's value lies in the texel scale, and 1 for an active voxel, 0 for an inactive one.
 using TexelTargets = std::array<float, format::kBrickVoxels>;
 using TexelWeights = std::array<float, format::kBrickVoxels>;
