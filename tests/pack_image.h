@@ -66,6 +66,7 @@ inline void sealAll(std::vector<std::byte>& bytes) {
         auto record = getAt<format::PageRecord>(bytes, entry.offset + p);
         if (record.offset > pages.size || record.storedSize > pages.size - record.offset) continue;
         record.checksum = checksum(std::span(bytes).subspan(pages.offset + record.offset, record.storedSize));
+        if (record.codec == 0) record.rawChecksum = static_cast<std::uint32_t>(record.checksum);
         putAt(bytes, entry.offset + p, record);
       }
       if (pass < 2) continue;
@@ -132,6 +133,7 @@ struct PackImage {
       records[i].rawSize = records[i].storedSize;
       records[i].codec = static_cast<std::uint32_t>(format::Codec::raw);
       records[i].checksum = checksum(pages[i]);
+      records[i].rawChecksum = static_cast<std::uint32_t>(records[i].checksum);
       content.insert(content.end(), pages[i].begin(), pages[i].end());
     }
     return assemble(content, records);

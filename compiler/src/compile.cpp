@@ -102,7 +102,7 @@ class Compiler {
  private:
   static format::PackWriter::Options writerOptions(const CompileOptions& options) {
     format::PackWriter::Options result;
-    result.zstdLevel = options.zstdLevel;
+    result.compression = options.compression;
     result.threads = options.threads;
     return result;
   }

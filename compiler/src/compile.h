@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "billow/format/writer.h"
 #include "choose/choose.h"
 #include "stages.h"
 
@@ -17,7 +18,7 @@ struct CompileOptions {
   ImportOptions import;
   Quality quality;
   unsigned threads = 0;  // 0: as many as the machine has
-  int zstdLevel = 3;
+  format::Compression compression = format::Compression::small;
   // Called before the first frame and after each with the number done and the number in all, one call at a time.
   std::function<void(std::size_t done, std::size_t total)> progress;
 };

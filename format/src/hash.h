@@ -18,6 +18,11 @@ inline std::uint64_t hashBytes(std::span<const std::byte> bytes) {
   return XXH3_64bits(bytes.data(), bytes.size());
 }
 
+// Its low half.
+inline std::uint32_t lowHash(std::span<const std::byte> bytes) {
+  return static_cast<std::uint32_t>(hashBytes(bytes));
+}
+
 // The checksum of bytes that arrive in pieces.
 class Hasher {
  public:

@@ -101,7 +101,7 @@ constexpr IssueKind kCatalogue[] = {
           "A global array has at most 2^27 units, 2^31 masks, or 2^32 - 1 other items."),
 
     error(Rule::pageChecksum, "page-checksum", "A page's checksum matches its stored bytes."),
-    error(Rule::pageDecompress, "page-decompress", "A page decompresses to exactly its raw size."),
+    error(Rule::pageDecompress, "page-decompress", "A page decompresses to exactly the bytes that were written."),
     error(Rule::pageMissing, "page-missing", "A grid frame lists every page that it needs."),
     warning(Rule::pageSuperfluous, "page-superfluous", "A grid frame lists only pages that it needs."),
     warning(Rule::pageUnused, "page-unused", "Every page is listed by a grid frame."),

@@ -7,27 +7,37 @@
 #include <stdexcept>
 #include <utility>
 
+#include "billow/format/page_codec.h"
+
 namespace billow::format {
 namespace {
 
 using Context = std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)>;
 
-CompressedPage compress(ZSTD_CCtx* context, std::vector<std::byte> raw, int level) {
-  CompressedPage page;
-  page.stored.resize(ZSTD_compressBound(raw.size()));
-  const std::size_t size =
-      ZSTD_compressCCtx(context, page.stored.data(), page.stored.size(), raw.data(), raw.size(), level);
+constexpr int kZstdLevel = 3;
+
+std::vector<std::byte> compressZstd(ZSTD_CCtx* context, std::span<const std::byte> raw) {
+  std::vector<std::byte> stored(ZSTD_compressBound(raw.size()));
+  const std::size_t size = ZSTD_compressCCtx(context, stored.data(), stored.size(), raw.data(), raw.size(), kZstdLevel);
   if (ZSTD_isError(size)) throw std::runtime_error(ZSTD_getErrorName(size));
-  if (size >= raw.size()) return {std::move(raw), Codec::raw};
-  page.codec = Codec::zstd;
-  page.stored.resize(size);
+  stored.resize(size);
+  return stored;
+}
+
+CompressedPage compress(ZSTD_CCtx* context, std::vector<std::byte> raw, const PageRuns& runs, Compression compression) {
+  CompressedPage page{compressZstd(context, raw), Codec::zstd};
+  if (compression == Compression::small) {
+    std::vector<std::byte> modelled = encodePage(runs, raw);
+    if (modelled.size() < page.stored.size()) page = {std::move(modelled), Codec::model};
+  }
+  if (page.stored.size() >= raw.size()) return {std::move(raw), Codec::raw};
   return page;
 }
 
 }  // namespace
 
-PageCompressor::PageCompressor(int zstdLevel, unsigned threads)
-    : level_(zstdLevel),
+PageCompressor::PageCompressor(Compression compression, unsigned threads)
+    : compression_(compression),
       threadLimit_(std::clamp<std::size_t>(threads != 0 ? threads : std::thread::hardware_concurrency(), 1, 8)) {}
 
 PageCompressor::~PageCompressor() {
@@ -39,9 +49,10 @@ PageCompressor::~PageCompressor() {
   for (std::thread& thread : threads_) thread.join();
 }
 
-void PageCompressor::submit(std::vector<std::byte> raw) {
+void PageCompressor::submit(std::vector<std::byte> raw, const PageRuns& runs) {
   auto job = std::make_shared<Job>();
   job->raw = std::move(raw);
+  job->runs = runs;
   jobs_.push_back(job);
   {
     const std::lock_guard lock(mutex_);
@@ -71,7 +82,7 @@ void PageCompressor::work() {
     lock.unlock();
     try {
       if (!context) throw std::bad_alloc();
-      job->page = compress(context.get(), std::move(job->raw), level_);
+      job->page = compress(context.get(), std::move(job->raw), job->runs, compression_);
     } catch (...) {
       job->failure = std::current_exception();
     }

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "billow/format/brick.h"
+#include "billow/format/page_codec.h"
 #include "hash.h"
 #include "rules.h"
 
@@ -45,13 +46,20 @@ bool isOneFrame(std::span<const std::byte> stored) {
          ZSTD_findFrameCompressedSize(stored.data(), stored.size()) == stored.size();
 }
 
-bool decompress(std::span<const std::byte> stored, std::vector<std::byte>& raw) {
+bool decompressZstd(std::span<const std::byte> stored, std::vector<std::byte>& raw) {
   if (!isOneFrame(stored)) return false;
   // A context is 150 KB: one a thread, not one a page.
   thread_local const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
   if (!context) return false;
   const std::size_t size = ZSTD_decompressDCtx(context.get(), raw.data(), raw.size(), stored.data(), stored.size());
   return !ZSTD_isError(size) && size == raw.size();
+}
+
+bool decompress(const PageRecord& record, std::span<const std::byte> stored, std::vector<std::byte>& raw) {
+  raw.resize(record.rawSize);
+  const bool done = record.codec == static_cast<std::uint32_t>(Codec::model) ? decodePage(record.streams, stored, raw)
+                                                                             : decompressZstd(stored, raw);
+  return done && lowHash(raw) == record.rawChecksum;
 }
 
 // Checks the items of one page, each by itself.
@@ -184,12 +192,12 @@ bool loadPage(const Pack& pack, std::uint32_t number, Page& page, IssueSink& sin
   }
   const PageRecord& record = pack.pages()[number];
   page.number = number;
-  if (record.codec == static_cast<std::uint32_t>(Codec::raw)) return readStored(pack, number, page.raw, sink);
+  const bool isRaw = record.codec == static_cast<std::uint32_t>(Codec::raw);
   thread_local std::vector<std::byte> stored;
-  if (!readStored(pack, number, stored, sink)) return false;
-  page.raw.resize(record.rawSize);
-  if (decompress(stored, page.raw)) return true;
-  sink.report(Rule::pageDecompress, pagePlace(pack, number), fmt::format("It does not give {} bytes.", record.rawSize));
+  if (!readStored(pack, number, isRaw ? page.raw : stored, sink)) return false;
+  if (isRaw ? lowHash(page.raw) == record.rawChecksum : decompress(record, stored, page.raw)) return true;
+  sink.report(Rule::pageDecompress, pagePlace(pack, number),
+              fmt::format("It does not give the {} bytes that were written.", record.rawSize));
   return false;
 }
 

@@ -247,7 +247,7 @@ void checkPageRecord(const PageRecord& page, const Place& place, IssueSink& sink
     bytes += std::uint64_t{page.streams[i].count} * kStreamItemBytes[i];
   }
   const bool raw = page.codec == static_cast<std::uint32_t>(Codec::raw);
-  if (!raw && page.codec != static_cast<std::uint32_t>(Codec::zstd)) {
+  if (page.codec > static_cast<std::uint32_t>(Codec::model)) {
     sink.report(Rule::pageCodec, place, fmt::format("Codec {}.", page.codec));
   }
   const bool stored = raw ? page.storedSize == page.rawSize : page.storedSize > 0 && page.storedSize < page.rawSize;
@@ -255,7 +255,6 @@ void checkPageRecord(const PageRecord& page, const Place& place, IssueSink& sink
     sink.report(Rule::pageSize, place,
                 fmt::format("{} bytes stored, {} raw, {} in its runs.", page.storedSize, page.rawSize, bytes));
   }
-  if (page.reserved != 0) sink.report(Rule::tableReserved, place, "A reserved field of a page is not.");
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ StringRef PackTables::addString(const std::string& text) {
 
 struct PackWriter::Impl {
   Impl(std::string path, Options given)
-      : options(given), file(std::move(path)), compressor(given.zstdLevel, given.threads) {
+      : options(given), file(std::move(path)), compressor(given.compression, given.threads) {
     options.pageBytes = std::clamp<std::uint32_t>(options.pageBytes, 1, kMaxPageBytes);
   }
 
@@ -100,8 +100,9 @@ void PackWriter::Impl::closePage() {
   }
   openFirst = total;
   openBytes = 0;
+  record.rawChecksum = lowHash(raw);
   pages.push_back(record);
-  compressor.submit(std::move(raw));
+  compressor.submit(std::move(raw), std::to_array(record.streams));
   if (compressor.full()) writeOldest();
 }
 

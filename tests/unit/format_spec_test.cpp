@@ -84,7 +84,7 @@ const std::map<std::string, Layout>& layouts() {
       {"PageRecord",
        {sizeof(PageRecord),
         {FIELD(PageRecord, offset), FIELD(PageRecord, checksum), FIELD(PageRecord, storedSize),
-         FIELD(PageRecord, rawSize), FIELD(PageRecord, codec), FIELD(PageRecord, reserved),
+         FIELD(PageRecord, rawSize), FIELD(PageRecord, codec), FIELD(PageRecord, rawChecksum),
          FIELD(PageRecord, streams)}}},
       {"StreamRange", {sizeof(StreamRange), {FIELD(StreamRange, first), FIELD(StreamRange, count)}}},
       {"Node5",

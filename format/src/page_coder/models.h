@@ -6,8 +6,9 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <iterator>
 
-#include "page_coder/rans.h"
+#include "rans.h"
 #ifdef __SSE2__
 #include <emmintrin.h>
 #endif
@@ -21,12 +22,12 @@ inline std::uint32_t symbolRate(std::uint32_t seen) {
   return 4 + (seen >= 8) + (seen >= 32) + (seen >= 128);
 }
 inline std::uint32_t bitRate(std::uint32_t seen) {
-  constexpr std::uint8_t kRates[] = {1, 2, 3, 3, 4, 4, 4, 4};
+  constexpr std::uint8_t kRates[] = {2, 2, 3, 3, 3, 4, 4, 4};
   return seen < std::size(kRates) ? kRates[seen] : 5 + (seen >= 32);
 }
 
 // 16 symbols: below[s] is the sum of the sizes of all symbols before s, strictly increasing from below[0] = 0.
-struct alignas(32) SymbolModel {
+struct alignas(16) SymbolModel {
   std::array<std::int16_t, kSymbols> below;
   std::uint32_t seen;
 };
@@ -40,6 +41,16 @@ constexpr SymbolModel evenModel() {
   SymbolModel model{};
   for (std::uint32_t i = 0; i < kSymbols; ++i) {
     model.below[i] = static_cast<std::int16_t>(i * (kScale / kSymbols));
+  }
+  return model;
+}
+// From sizes in 256ths.
+constexpr SymbolModel modelOf(const std::uint16_t (&sizes)[kSymbols]) {
+  SymbolModel model{};
+  std::uint32_t sum = 0;
+  for (std::uint32_t i = 0; i < kSymbols; ++i) {
+    model.below[i] = static_cast<std::int16_t>(sum * (kScale / 256));
+    sum += sizes[i];
   }
   return model;
 }
@@ -62,8 +73,8 @@ inline void adapt(SymbolModel& model, std::uint32_t symbol) {
   const __m128i rise = _mm_set1_epi16(static_cast<std::int16_t>(kScale - kSymbols));
   auto* lanes = reinterpret_cast<__m128i*>(model.below.data());
   for (int half = 0; half < 2; ++half) {
-    const __m128i index = _mm_add_epi16(_mm_setr_epi16(0, 1, 2, 3, 4, 5, 6, 7),
-                                        _mm_set1_epi16(static_cast<std::int16_t>(8 * half)));
+    const __m128i index =
+        _mm_add_epi16(_mm_setr_epi16(0, 1, 2, 3, 4, 5, 6, 7), _mm_set1_epi16(static_cast<std::int16_t>(8 * half)));
     const __m128i target = _mm_add_epi16(index, _mm_and_si128(_mm_cmpgt_epi16(index, chosen), rise));
     const __m128i now = _mm_load_si128(lanes + half);
     _mm_store_si128(lanes + half, _mm_add_epi16(now, _mm_sra_epi16(_mm_sub_epi16(target, now), shift)));
@@ -114,7 +125,7 @@ class Encoder {
     adapt(model, value);
     return value;
   }
-  // `count` bits without a model, at most 32; 15 at a time, the low ones first.
+  // `count` bits without a model, at most 32; 14 at a time, the low ones first.
   std::uint32_t bits(std::uint32_t count, std::uint32_t value) {
     for (std::uint32_t done = 0; done < count;) {
       const std::uint32_t step = count - done < 14 ? count - done : 14;
@@ -123,7 +134,7 @@ class Encoder {
     }
     return value;
   }
-  void finish(std::vector<std::byte>& out) const { rans_.finish(out); }
+  std::vector<std::byte> finish() { return rans_.finish(); }
 
  private:
   RansEncoder rans_;

@@ -1,5 +1,5 @@
 // The entropy coder under the page codec: range variant of asymmetric numeral systems (J. Duda, "Asymmetric numeral
-// systems", arXiv:1311.2540) with two 32-bit states that take turns, renormalised by 16-bit words. spec/pagecodec.md.
+// systems", arXiv:1311.2540) with two 32-bit states that take turns, renormalised by 16-bit words_. spec/pagecodec.md.
 //
 // An interval is [start, start + size) of [0, kScale), size from 1 to kScale - 1.
 #ifndef BILLOW_FORMAT_SRC_PAGE_CODER_RANS_H
@@ -22,32 +22,36 @@ class RansEncoder {
  public:
   void put(std::uint32_t start, std::uint32_t size) { intervals_.push_back(size << 16 | start); }
 
-  void finish(std::vector<std::byte>& out) const {
-    std::vector<std::uint16_t> words;
+  // The bytes of all intervals put since the last call.
+  std::vector<std::byte> finish() {
+    words_.clear();
     std::uint32_t states[2] = {kStateLow, kStateLow};
     for (std::size_t i = intervals_.size(); i-- > 0;) {
       const std::uint32_t start = intervals_[i] & 0xffff;
       const std::uint32_t size = intervals_[i] >> 16;
       std::uint32_t& state = states[i & 1];
       if (state >> 17 >= size) {
-        words.push_back(static_cast<std::uint16_t>(state));
+        words_.push_back(static_cast<std::uint16_t>(state));
         state >>= 16;
       }
       state = state / size * kScale + state % size + start;
     }
-    out.clear();
-    out.reserve(8 + 2 * words.size());
+    std::vector<std::byte> out;
+    out.reserve(8 + 2 * words_.size());
     for (const std::uint32_t state : states) {
       for (int byte = 0; byte < 4; ++byte) out.push_back(static_cast<std::byte>(state >> (8 * byte)));
     }
-    for (std::size_t i = words.size(); i-- > 0;) {
-      out.push_back(static_cast<std::byte>(words[i]));
-      out.push_back(static_cast<std::byte>(words[i] >> 8));
+    for (std::size_t i = words_.size(); i-- > 0;) {
+      out.push_back(static_cast<std::byte>(words_[i]));
+      out.push_back(static_cast<std::byte>(words_[i] >> 8));
     }
+    intervals_.clear();
+    return out;
   }
 
  private:
   std::vector<std::uint32_t> intervals_;
+  std::vector<std::uint16_t> words_;
 };
 
 // Reads what an encoder wrote. Of other bytes it gives some intervals, reads 0 past their end, and says so in sound().

@@ -283,7 +283,7 @@ struct StreamRange {  // [first, first + count) of the stream's global array
 };
 BILLOW_ASSERT_SIZE(StreamRange, 8);
 
-enum class Codec : std::uint32_t { raw = 0, zstd = 1 };
+enum class Codec : std::uint32_t { raw = 0, zstd = 1, model = 2 };
 
 struct PageRecord {
   std::uint64_t offset;    // from the start of the PAGE section
@@ -291,7 +291,7 @@ struct PageRecord {
   std::uint32_t storedSize;
   std::uint32_t rawSize;
   std::uint32_t codec;
-  std::uint32_t reserved;
+  std::uint32_t rawChecksum;  // low half of the XXH3-64 of the content
   StreamRange streams[kStreamCount];
 };
 BILLOW_ASSERT_SIZE(PageRecord, 80);

@@ -25,13 +25,17 @@ struct PackTables {
   StringRef addString(const std::string& text);  // equal strings share
 };
 
+// What pages are compressed for: `small`, the fewest bytes (Codec::model, or zstd where that is smaller still), or
+// `fast`, the quickest reading (Codec::zstd). Pages that don't shrink are stored raw.
+enum class Compression { small, fast };
+
 // Writes to a temporary name beside `path`, renamed by commit(); the destructor removes what is unfinished.
 // Throws std::system_error (with the path) when the file cannot be written.
 class PackWriter {
  public:
   struct Options {
     std::uint32_t pageBytes = 128u << 10;  // raw bytes at which a page is closed
-    int zstdLevel = 3;
+    Compression compression = Compression::small;
     unsigned threads = 0;  // that compress pages; 0: as many as the machine has, at most 8. The bytes are the same.
   };
   PackWriter(std::string path, Options options);
