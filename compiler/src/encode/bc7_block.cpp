@@ -34,18 +34,17 @@ struct Fields {
   std::uint32_t steps[2][16];  // all channels or colour; the separate channel
 };
 
-Fields toFields(const Bc7Fits& fits, std::uint32_t block) {
+Fields toFields(const format::Bc7Mode& mode, const Bc7Fits& fits, std::uint32_t block) {
   Fields fields{};
   for (std::uint32_t c = 0; c < 4; ++c) {
-    for (std::uint32_t s = 0; s < 2; ++s) {
+    for (std::uint32_t s = 0; s < mode.subsets; ++s) {
       fields.ends[2 * s][c] = static_cast<std::uint32_t>(fits.first[s][c][block]);
       fields.ends[2 * s + 1][c] = static_cast<std::uint32_t>(fits.second[s][c][block]);
     }
   }
-  for (std::uint32_t i = 0; i < 16; ++i) {
-    fields.steps[0][i] = static_cast<std::uint32_t>(fits.step[i][block]);
-    fields.steps[1][i] = static_cast<std::uint32_t>(fits.separateStep[i][block]);
-  }
+  for (std::uint32_t i = 0; i < 16; ++i) fields.steps[0][i] = static_cast<std::uint32_t>(fits.step[i][block]);
+  if (mode.indexBits2 == 0) return fields;
+  for (std::uint32_t i = 0; i < 16; ++i) fields.steps[1][i] = static_cast<std::uint32_t>(fits.separateStep[i][block]);
   return fields;
 }
 
@@ -70,25 +69,34 @@ void putEnds(const format::Bc7Mode& mode, const Fields& fields, BitWriter& write
 }
 
 void putSteps(const std::uint32_t steps[16], std::uint32_t bits, std::uint32_t anchors, BitWriter& writer) {
-  for (std::uint32_t i = 0; i < 16; ++i) writer.put(steps[i], bits - (anchors >> i & 1u));
+  std::uint64_t together = 0;
+  std::uint32_t count = 0;
+  for (std::uint32_t i = 0; i < 16; ++i) {
+    together |= static_cast<std::uint64_t>(steps[i]) << count;
+    count += bits - (anchors >> i & 1u);
+  }
+  // Two to four bits a step, less one for each anchor: 30 to 63.
+  writer.put(static_cast<std::uint32_t>(together & 0xffff), 16);
+  writer.put(static_cast<std::uint32_t>(together >> 16 & 0xffff), std::min(count - 16, 16u));
+  if (count > 32) writer.put(static_cast<std::uint32_t>(together >> 32), count - 32);
 }
 
 }  // namespace
 
 Bc7Search bc7Search(int effort) {
   static constexpr Bc7Search kSearches[] = {
-      // passes, starts, rotations, ranked, partitions, nudges, mode4, allPBits, everyAxis, ranges
+      // passes, starts, rotations, ranked, partitions, nudges, mode5, allPBits, everyAxis, ranges
       {1, 1, 0, 0, 0, 0, false, false, false, 0},  // 0: mode 6 alone
-      {1, 1, 1, 16, 1, 0, true, false, false,
+      {1, 1, 1, 16, 1, 0, false, false, false,
        0},  // 1: the other modes, with the likeliest rotation and partition of 16
-      {2, 1, 1, 64, 2, 0, true, false, false, 0},  // 2: the two likeliest of all partitions
-      {2, 1, 4, 64, 4, 0, true, true, true, 0},    // 3: all modes, rotations and p-bits along each packed axis
-      {2, 2, 4, 64, 4, 0, true, true, true, 1},    // 4: a second first guess; the brick's range solved with the blocks
-      {2, 2, 4, 64, 6, 1, true, true, true, 1},    // 5: ends moved by single steps
-      {3, 3, 4, 64, 8, 2, true, true, true, 1},    // 6: a third guess, more steps and partitions
-      {3, 3, 4, 64, 12, 4, true, true, true, 2},   // 7: the same, until little is gained
-      {4, 4, 4, 64, 16, 4, true, true, true, 3},   // 8: a fourth guess
-      {6, 4, 4, 64, 32, 8, true, true, true, 4},   // 9: half of all partitions
+      {2, 1, 1, 64, 2, 0, false, false, false, 0},  // 2: the two likeliest of all partitions
+      {2, 1, 4, 64, 4, 0, true, true, true, 0},     // 3: all modes, rotations and p-bits along each packed axis
+      {2, 2, 4, 64, 4, 0, true, true, true, 1},     // 4: a second first guess; the brick's range solved with the blocks
+      {2, 2, 4, 64, 6, 1, true, true, true, 1},     // 5: ends moved by single steps
+      {3, 3, 4, 64, 8, 2, true, true, true, 1},     // 6: a third guess, more steps and partitions
+      {3, 3, 4, 64, 12, 4, true, true, true, 2},    // 7: the same, until little is gained
+      {4, 4, 4, 64, 16, 4, true, true, true, 3},    // 8: a fourth guess
+      {6, 4, 4, 64, 32, 8, true, true, true, 4},    // 9: half of all partitions
   };
   return kSearches[std::clamp(effort, 0, 9)];
 }
@@ -98,7 +106,7 @@ void packBlock(const Bc7Fits& fits, std::uint32_t block, std::byte* bytes) {
   const format::Bc7Mode& mode = format::kBc7Modes[number];
   const std::uint32_t partition = mode.subsets == 2 ? static_cast<std::uint32_t>(fits.partition[block]) : 0;
   const bool colorIsSecond = number == 4 && fits.colorIsSecond[block] != 0;
-  Fields fields = toFields(fits, block);
+  Fields fields = toFields(mode, fits, block);
   const bool separate = mode.indexBits2 != 0;
   const std::uint32_t bits = colorIsSecond ? mode.indexBits2 : mode.indexBits;
   const std::uint32_t second = mode.subsets == 2 ? format::kBc7Partitions2[partition] : 0u;

@@ -30,7 +30,7 @@ struct Bc7Search {
   int ranked = 0;          // partitions of mode 7 that are compared, at most 64
   int partitions = 0;      // of those that are tried, the most promising first, at most 32
   int nudges = 0;          // rounds of moving each end by single steps
-  bool mode4 = false;      // else mode 5 alone
+  bool mode5 = false;      // else mode 4 alone, which serves nearly as well
   bool allPBits = false;   // every combination, not just the nearest
   bool everyAxis = false;  // all modes for each packed axis, not just for the one that mode 6 serves best
   int ranges = 0;          // rounds of solving the brick's lo and scale and encoding again

@@ -55,7 +55,7 @@ HWY_INLINE void dominantAxis(const V covariance[kPairs], V axis[kChannels]) {
     return;
   }
   largestRow<kChannels>(covariance, axis);
-  for (int pass = 0; pass < 4; ++pass) {
+  for (int pass = 0; pass < 2; ++pass) {
     normalise<kChannels>(axis);
     V image[kChannels];
     multiply<kChannels>(covariance, axis, image);

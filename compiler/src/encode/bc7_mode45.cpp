@@ -97,10 +97,10 @@ void tryRotation(const BlockTexels& texels, std::uint32_t lane, V rotation, cons
   rotate<kWeights>(texels, lane, rotation, rotated);
   const Part<3, kWeights> color(rotated, 0, search);
   const Part<1, kWeights> separate(rotated, 3, search);
-  tryMode<Mode5Color, Mode5Separate, kWeights>(color, separate, lane, 5, rotation, 0, search, fits);
-  if (!search.mode4) return;
   tryMode<Mode4Color, Mode4Separate, kWeights>(color, separate, lane, 4, rotation, 0, search, fits);
   tryMode<Mode4ColorSecond, Mode4SeparateSecond, kWeights>(color, separate, lane, 4, rotation, 1, search, fits);
+  if (!search.mode5) return;
+  tryMode<Mode5Color, Mode5Separate, kWeights>(color, separate, lane, 5, rotation, 0, search, fits);
 }
 
 // The rotation that takes out the channel which one line, mode 6's, serves worst.

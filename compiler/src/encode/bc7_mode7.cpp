@@ -30,19 +30,22 @@ struct Subset {
       plane.value[c] = whole.value[c];
       plane.weight[c] = weight[kWeightChannels == 4 ? c : 0][0];
     }
-    plane.sum();
   }
 };
 
-void subsets(V partition, float first[16][8], float second[16][8]) {
-  float numbers[8];
+HWY_INLINE void subsets(V partition, float first[16][8], float second[16][8]) {
+  using IntLanes = hn::Rebind<std::uint32_t, FloatLanes>;
+  float numbers[kLanes];
+  std::uint32_t texels[kLanes];
   store(partition, numbers);
   for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
-    const std::uint32_t texels = format::kBc7Partitions2[static_cast<std::uint32_t>(numbers[lane])];
-    for (std::uint32_t i = 0; i < 16; ++i) {
-      second[i][lane] = static_cast<float>(texels >> i & 1u);
-      first[i][lane] = 1.0f - second[i][lane];
-    }
+    texels[lane] = format::kBc7Partitions2[static_cast<std::uint32_t>(numbers[lane])];
+  }
+  const auto bits = hn::LoadU(IntLanes(), texels);
+  for (int i = 0; i < 16; ++i) {
+    const M isSecond = hn::RebindMask(FloatLanes(), hn::TestBit(bits, hn::Set(IntLanes(), 1u << i)));
+    store(select(isSecond, all(0.0f), all(1.0f)), first[i]);
+    store(select(isSecond, all(1.0f), all(0.0f)), second[i]);
   }
 }
 
@@ -63,6 +66,11 @@ struct PartitionFit {
     subsets(partition, inFirst, inSecond);
     half[0].set(plane, inFirst);
     half[1].set(plane, inSecond);
+    half[0].plane.sum();
+    for (int c = 0; c < 4; ++c) {
+      half[1].plane.count[c] = plane.count[c] - half[0].plane.count[c];
+      half[1].plane.total[c] = plane.total[c] - half[0].plane.total[c];
+    }
     for (int h = 0; h < 2; ++h) line[h] = fitLine<Mode7>(half[h].plane, guessEnds(half[h].plane, search), search);
   }
   HWY_INLINE V error() const { return line[0].error + line[1].error; }

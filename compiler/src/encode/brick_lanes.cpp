@@ -1,6 +1,5 @@
 #include "encode/brick_lanes.h"
 
-#include <cstring>
 #include <limits>
 
 #undef HWY_TARGET_INCLUDE
@@ -13,27 +12,31 @@ HWY_BEFORE_NAMESPACE();
 namespace billow::compiler::HWY_NAMESPACE {
 namespace {
 
+using IntLanes = hn::Rebind<std::uint32_t, FloatLanes>;
+
+// Which of the voxels from `index` on are active.
+HWY_INLINE M activeFrom(const BrickSource& brick, std::uint32_t index) {
+  alignas(32) static constexpr std::uint32_t kBits[8] = {1, 2, 4, 8, 16, 32, 64, 128};
+  const auto bits = hn::Set(IntLanes(), brick.active->words[index >> 5] >> (index & 31));
+  return hn::RebindMask(FloatLanes(), hn::TestBit(bits, hn::LoadU(IntLanes(), kBits)));
+}
+
 void setTexelWeights(const BrickSource& brick, TexelWeights& weights) {
-  static constexpr std::uint32_t kBits[8] = {1, 2, 4, 8, 16, 32, 64, 128};
-  float* to = weights.data();
-  for (std::uint32_t byte = 0; byte < format::kBrickVoxels / 8; ++byte) {
-    const std::uint32_t bits = brick.active->words[byte >> 2] >> (8 * (byte & 3));
-    for (std::uint32_t i = 0; i < 8; ++i) to[byte * 8 + i] = (bits & kBits[i]) != 0 ? 1.0f : 0.0f;
+  for (std::uint32_t i = 0; i < format::kBrickVoxels; i += kLanes) {
+    store(select(activeFrom(brick, i), all(1.0f), all(0.0f)), weights.data() + i);
   }
 }
 
 ValueRange activeRange(const BrickSource& brick) {
   if (brick.activeCount == 0) return {};
-  TexelWeights weights;
-  setTexelWeights(brick, weights);
   const float* values = brick.values->data();
   V low = all(std::numeric_limits<float>::max());
   V high = all(std::numeric_limits<float>::lowest());
   for (std::uint32_t i = 0; i < format::kBrickVoxels; i += kLanes) {
     const V value = load(values + i);
-    const M active = load(weights.data() + i) > all(0.0f);
-    low = select(both(active, value < low), value, low);
-    high = select(both(active, value > high), value, high);
+    const M active = activeFrom(brick, i);
+    low = select(active, min(value, low), low);
+    high = select(active, max(value, high), high);
   }
   float lows[kLanes], highs[kLanes];
   store(low, lows);
@@ -47,26 +50,31 @@ ValueRange activeRange(const BrickSource& brick) {
   return {range.min + 0.0f, range.max + 0.0f};
 }
 
+using DoubleLanes = hn::CappedTag<double, 8>;
+using HalfLanes = hn::Rebind<float, DoubleLanes>;  // as many floats
+constexpr auto kDoubleLanes = static_cast<std::uint32_t>(hn::MaxLanes(DoubleLanes()));
+
+HWY_INLINE hn::Vec<DoubleLanes> loadDoubles(const float* from) {
+  return hn::PromoteTo(DoubleLanes(), hn::LoadU(HalfLanes(), from));
+}
+
 void texelTargets(const BrickSource& brick, TexelRange range, std::uint32_t first, std::uint32_t last,
                   TexelTargets& targets) {
   // In double: 1 / scale of a denormal is finite there, and so is the difference of any two floats.
-  const double inverse = range.scale > 0 ? 1.0 / static_cast<double>(range.scale) : 0.0;
-  const auto lo = static_cast<double>(range.lo);
-  const auto low = static_cast<double>(first);
-  const auto high = static_cast<double>(last);
+  const auto inverse = hn::Set(DoubleLanes(), range.scale > 0 ? 1.0 / static_cast<double>(range.scale) : 0.0);
+  const auto lo = hn::Set(DoubleLanes(), static_cast<double>(range.lo));
+  const auto low = hn::Set(DoubleLanes(), static_cast<double>(first));
+  const auto high = hn::Set(DoubleLanes(), static_cast<double>(last));
   const float* values = brick.values->data();
   float* to = targets.data();
-  for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) {
-    const double raw = (static_cast<double>(values[i]) - lo) * inverse;
-    const double above = raw > low ? raw : low;
-    to[i] = static_cast<float>(above < high ? above : high);
+  for (std::uint32_t i = 0; i < format::kBrickVoxels; i += kDoubleLanes) {
+    const auto raw = (loadDoubles(values + i) - lo) * inverse;
+    hn::StoreU(hn::DemoteTo(HalfLanes(), hn::Min(hn::Max(raw, low), high)), HalfLanes(), to + i);
   }
   if (brick.activeCount == format::kBrickVoxels) return;
-  TexelWeights weights;
-  setTexelWeights(brick, weights);
   const V inactive = all(static_cast<float>(first));
   for (std::uint32_t i = 0; i < format::kBrickVoxels; i += kLanes) {
-    store(select(load(weights.data() + i) > all(0.0f), load(to + i), inactive), to + i);
+    store(select(activeFrom(brick, i), load(to + i), inactive), to + i);
   }
 }
 
@@ -82,24 +90,30 @@ void measure(const BrickSource& brick, const format::Texels& texels, Candidate& 
   }
   const float* values = brick.values->data();
   if (brick.activeCount != format::kBrickVoxels) {
-    TexelWeights weights;
-    setTexelWeights(brick, weights);
     for (std::uint32_t i = 0; i < format::kBrickVoxels; i += kLanes) {
-      store(select(load(weights.data() + i) > all(0.0f), load(decoded + i), load(values + i)), decoded + i);
+      store(select(activeFrom(brick, i), load(decoded + i), load(values + i)), decoded + i);
     }
   }
   // In double: the difference of any two floats is finite there. Eight sums whatever the vectors' width, so that every
   // machine adds in the same order.
   constexpr std::uint32_t kSums = 8;
-  double squared[kSums] = {};
-  double largest[kSums] = {};
+  constexpr std::uint32_t kParts = kSums / kDoubleLanes;
+  hn::Vec<DoubleLanes> squaredParts[kParts], largestParts[kParts];
+  for (std::uint32_t part = 0; part < kParts; ++part) {
+    squaredParts[part] = largestParts[part] = hn::Zero(DoubleLanes());
+  }
   for (std::uint32_t i = 0; i < format::kBrickVoxels; i += kSums) {
-    for (std::uint32_t j = 0; j < kSums; ++j) {
-      const double error = static_cast<double>(decoded[i + j]) - static_cast<double>(values[i + j]);
-      const double magnitude = error < 0 ? -error : error;
-      squared[j] += error * error;
-      largest[j] = largest[j] > magnitude ? largest[j] : magnitude;
+    for (std::uint32_t part = 0; part < kParts; ++part) {
+      const std::uint32_t at = i + part * kDoubleLanes;
+      const auto error = loadDoubles(decoded + at) - loadDoubles(values + at);
+      squaredParts[part] = squaredParts[part] + error * error;
+      largestParts[part] = hn::Max(largestParts[part], hn::Abs(error));
     }
+  }
+  double squared[kSums], largest[kSums];
+  for (std::uint32_t part = 0; part < kParts; ++part) {
+    hn::StoreU(squaredParts[part], DoubleLanes(), squared + part * kDoubleLanes);
+    hn::StoreU(largestParts[part], DoubleLanes(), largest + part * kDoubleLanes);
   }
   candidate.squaredError = 0;
   double most = 0;
