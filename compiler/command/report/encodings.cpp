@@ -17,9 +17,17 @@ constexpr EncodingFamily kFamilies[] = {
      [](const BrickSource& brick, std::uint32_t, int effort, Candidate& out) {
        compiler::encodeBc7BestAxis(brick, effort, out);
      }},
-    {"uniform", format::kEncodingUniform1, format::kEncodingUniform16, 0, nullptr},
-    {"local", format::kEncodingLocal2, format::kEncodingLocal6, 0, nullptr},
-    {"coarse", format::kEncodingCoarse, format::kEncodingCoarse, 0, nullptr},
+    {"uniform", format::kEncodingUniform1, format::kEncodingUniform16,
+     format::kEncodingUniform16 - format::kEncodingUniform1 + 1,
+     [](const BrickSource& brick, std::uint32_t encoding, int, Candidate& out) {
+       compiler::encodeUniform(brick, format::indexBits(encoding), out);
+     }},
+    {"local", format::kEncodingLocal2, format::kEncodingLocal6, format::kEncodingLocal6 - format::kEncodingLocal2 + 1,
+     [](const BrickSource& brick, std::uint32_t encoding, int, Candidate& out) {
+       compiler::encodeLocal(brick, format::indexBits(encoding), out);
+     }},
+    {"coarse", format::kEncodingCoarse, format::kEncodingCoarse, 1,
+     [](const BrickSource& brick, std::uint32_t, int, Candidate& out) { compiler::encodeCoarse(brick, out); }},
 };
 
 }  // namespace
