@@ -35,9 +35,10 @@ nlohmann::ordered_json toJson(const GridRow& row) {
     json["problem"] = row.problem;
     return json;
   }
-  const double psnr = row.psnr();
+  const auto decibels = [](double db) { return std::isfinite(db) ? nlohmann::ordered_json(db) : nullptr; };
   json["activeVoxels"] = row.error.sourceVoxels;
-  json["psnr"] = std::isfinite(psnr) ? nlohmann::ordered_json(psnr) : nullptr;  // null: exact
+  json["psnr"] = decibels(row.psnr());  // null: exact
+  json["depthPsnr"] = decibels(row.depthPsnr());
   json["exact"] = row.error.squaredError == 0;
   json["rmse"] = row.error.rmse();
   json["maxError"] = row.error.maxError;
@@ -46,17 +47,18 @@ nlohmann::ordered_json toJson(const GridRow& row) {
 }
 
 void printTable(const std::vector<GridRow>& rows) {
-  fmt::print("{:>6} {:<24} {:>13} {:>9} {:>11} {:>11} {:>10}\n", "frame", "grid", "active voxels", "PSNR dB", "RMSE",
-             "max error", "mismatched");
+  fmt::print("{:>6} {:<24} {:>13} {:>9} {:>9} {:>11} {:>11} {:>10}\n", "frame", "grid", "active voxels", "PSNR dB",
+             "depth dB", "RMSE", "max error", "mismatched");
   for (const GridRow& row : rows) {
     const std::string name = row.volume + "/" + row.grid;
     if (!row.problem.empty()) {
       fmt::print("{:>6} {:<24} {}\n", row.frame, name, row.problem);
       continue;
     }
-    const std::string psnr = row.error.squaredError == 0 ? "exact" : fmt::format("{:.2f}", row.psnr());
-    fmt::print("{:>6} {:<24} {:>13} {:>9} {:>11.4g} {:>11.4g} {:>10}\n", row.frame, name, row.error.sourceVoxels, psnr,
-               row.error.rmse(), row.error.maxError, row.error.mismatchedVoxels);
+    const auto decibels = [](double db) { return db > 0 && std::isinf(db) ? "exact" : fmt::format("{:.2f}", db); };
+    fmt::print("{:>6} {:<24} {:>13} {:>9} {:>9} {:>11.4g} {:>11.4g} {:>10}\n", row.frame, name, row.error.sourceVoxels,
+               decibels(row.psnr()), decibels(row.depthPsnr()), row.error.rmse(), row.error.maxError,
+               row.error.mismatchedVoxels);
   }
 }
 
@@ -132,6 +134,7 @@ void addCompare(CLI::App& app, Run& run) {
   command->add_flag("--json", arguments->json, "Print the figures as one JSON object");
   command->footer(
       "PSNR is 20 log10((max - min) / RMSE) over active voxels; max and min are the source's, background included.\n"
+      "Depth is the same over line integrals (optical depth) along nine directions: what pictures are made of.\n"
       "Exit code 3 when a frame or a grid of the source is not in the pack, or a voxel is active in one of them only.\n"
       "The report is one HTML file that needs no network. For each grid it measures every encoding on its worst "
       "frame.\n"

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <limits>
+
 #include "billow/format/psnr.h"
 #include "import_options.h"
 #include "pack_lookup.h"
@@ -53,6 +55,7 @@ class Comparison {
     if (!view) return view.error();
     const compiler::ImportedGrid pack = reconstruct(*view);
     row.error = measureError(source, pack);
+    row.depth = compiler::measureDepth(source, pack);
     row.range = static_cast<double>(source.max) - static_cast<double>(source.min);
     if (source.background != gridFrame.background) {
       row.problem = fmt::format("background {} in the pack, {} in the source", gridFrame.background, source.background);
@@ -71,6 +74,12 @@ class Comparison {
 
 double GridRow::psnr() const {
   return format::psnr(range, error.squaredError, error.sourceVoxels);
+}
+
+double GridRow::depthPsnr() const {
+  // What differs then is how sums of tiles and of their voxels round.
+  if (sound() && error.squaredError == 0) return std::numeric_limits<double>::infinity();
+  return depth.psnr();
 }
 
 bool GridRow::sound() const {

@@ -9,6 +9,7 @@
 
 #include "billow/format/grid_view.h"
 #include "grid_error.h"
+#include "metric/depth_error.h"
 #include "stages.h"
 
 namespace billow::command {
@@ -20,9 +21,12 @@ struct GridRow {
   GridError error;
   double range = 0;     // max - min of the source's active values and background
   std::string problem;  // "" where the grid was compared
+  compiler::DepthError depth{};
 
   // Decibels over active voxels; infinite where the reconstruction is exact.
   double psnr() const;
+  // The same over line integrals.
+  double depthPsnr() const;
   // Whether the pack holds what the source holds, whatever its error.
   bool sound() const;
 };

@@ -150,6 +150,8 @@ TEST_F(Extract, CompareMeetsWhatCompileWasAsked) {
     EXPECT_EQ(grid.at("mismatchedVoxels"), 0);
     EXPECT_TRUE(grid.at("exact") == true || grid.at("psnr") >= 45) << grid;
     EXPECT_GE(grid.at("maxError"), grid.at("rmse")) << grid;
+    EXPECT_EQ(grid.at("depthPsnr").is_null(), grid.at("exact") == true) << grid;
+    EXPECT_TRUE(grid.at("exact") == true || grid.at("depthPsnr") > 30) << grid;
   }
 }
 

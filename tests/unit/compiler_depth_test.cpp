@@ -9,6 +9,7 @@
 #include <random>
 #include <tuple>
 
+#include "metric/depth_distortion.h"
 #include "metric/depth_error.h"
 
 namespace billow::compiler {
@@ -204,6 +205,17 @@ TEST(DepthError, DoesNotDependOnThreads) {
   const DepthError many = measureDepth(source, result);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   EXPECT_EQ(many.squaredError, measureDepth(source, result).squaredError);
+}
+
+TEST(DepthDistortion, OfABrickIsTheErrorOfItsLines) {
+  std::mt19937 random(9);
+  const Leaf result = randomLeaf({0, 0, 0}, 0, random);
+  ImportedGrid zeros, errors;
+  zeros.leaves.push_back(result);
+  zeros.leaves[0].values.fill(0);
+  errors.leaves.push_back(result);
+  const double expected = bruteForce(zeros, errors).squaredError;
+  EXPECT_NEAR(depthDistortion(result.values), expected, 1e-9 * expected);
 }
 
 TEST(DepthError, NothingHasNoError) {
