@@ -23,6 +23,7 @@ struct Arguments {
   std::optional<float> maxError;
   std::optional<std::uint64_t> gpuBudget;
   std::optional<double> framesPerSecond;
+  std::string metric = "voxel";
   int effort = 1;
   unsigned threads = 0;
   bool json = false;
@@ -82,6 +83,7 @@ int runCompile(const Arguments& arguments) {
   if (arguments.psnr) options.quality.psnr = arguments.psnr;
   // An error bound or a budget alone replaces the default PSNR.
   if ((arguments.maxError || arguments.gpuBudget) && !arguments.psnr) options.quality.psnr.reset();
+  if (arguments.metric == "depth") options.quality.metric = compiler::Metric::depth;
   options.quality.maxError = arguments.maxError;
   options.quality.gpuBudget = arguments.gpuBudget;
   options.quality.effort = arguments.effort;
@@ -119,11 +121,18 @@ void addCompile(CLI::App& app, Run& run) {
       ->check(finiteNumber())
       ->check(CLI::PositiveNumber)
       ->type_name("E");
+  CLI::Option* metric = command
+                            ->add_option("--metric", arguments->metric,
+                                         "What --psnr is of: voxel, or depth: integrals along rays of nine directions")
+                            ->check(CLI::IsMember({"voxel", "depth"}))
+                            ->needs(psnr)
+                            ->capture_default_str();
   command
       ->add_option("--gpu-budget", arguments->gpuBudget,
                    "Largest GPU size of any frame, all grids together; the error is the least that fits")
       ->transform(CLI::AsSizeValue(false))
       ->excludes(psnr)
+      ->excludes(metric)
       ->type_name("BYTES");
   command->add_option("--fps", arguments->framesPerSecond, "Frames per second of the sequence [24, or the manifest's]")
       ->check(finiteNumber())

@@ -61,6 +61,7 @@ std::string settingsJson(const CompileOptions& options) {
   info["generator"] = "billow " BILLOW_VERSION;
   info["quality"]["effort"] = options.quality.effort;
   if (options.quality.psnr) info["quality"]["psnr"] = *options.quality.psnr;
+  if (options.quality.metric == Metric::depth) info["quality"]["metric"] = "depth";
   if (options.quality.maxError) info["quality"]["maxError"] = static_cast<double>(*options.quality.maxError);
   return info.dump(2) + "\n";
 }

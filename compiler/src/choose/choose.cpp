@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "billow/format/gpu_size.h"
+#include "choose/depth_goal.h"
 #include "parallel.h"
 #include "share/share.h"
 
@@ -64,11 +65,13 @@ class GridChooser {
   GridChooser(const ImportedGrid& grid, const Quality& quality) : grid_(grid), quality_(quality) {
     bricks_.resize(grid.leaves.size());
     choices_.resize(grid.leaves.size());
+    if (quality.metric == Metric::depth) depth_.emplace(grid, *quality.psnr);
   }
 
   // Squared error that `psnr` dB allow. Tiles are exact and carry none, so it is spread over leaf voxels alone: a few
   // noisy leaves beside a vast constant tile must not be let go on the tile's account.
   double budget(std::optional<double> psnr) const {
+    if (depth_) return depth_->budget();
     if (!psnr) return std::numeric_limits<double>::infinity();
     std::uint64_t voxels = 0;
     for (const std::uint32_t count : counts_) voxels += count;
@@ -107,13 +110,20 @@ class GridChooser {
   }
 
   void tryUniform() {
-    forEachBrick([this](std::size_t i, Candidate&) {
+    forEachBrick([this](std::size_t i, Candidate& candidate) {
       if (quiet_[i]) return;
       std::array<Fit, 8> fits;
       fitUniforms(source(i), fits);
       // With one bit that says which voxels are active nothing is left: that is a constant.
       const std::size_t first = fits[0].texelMask ? 1 : 0;
-      for (std::size_t f = first; f < fits.size(); ++f) add(i, fits[f]);
+      for (std::size_t f = first; f < fits.size(); ++f) {
+        if (!depth_) {
+          add(i, fits[f], fits[f].squaredError);
+          continue;
+        }
+        encodeUniform(source(i), static_cast<std::uint32_t>(f + 1), candidate);
+        add(i, candidate);
+      }
     });
   }
 
@@ -128,7 +138,7 @@ class GridChooser {
       const std::array<double, 5> guesses = estimateLocals(source(i));
       for (std::uint32_t bits = 2; bits <= 6; ++bits) {
         const std::uint32_t bytes = *format::brickBytes(format::localEncoding(bits));
-        if (!mayPay(i, bytes, guesses[bits - 2] * kOptimism, multiplier)) continue;
+        if (!mayPay(i, bytes, guesses[bits - 2] * noiseDistortion() * kOptimism, multiplier)) continue;
         encodeLocal(source(i), bits, candidate);
         add(i, candidate);
       }
@@ -145,7 +155,7 @@ class GridChooser {
   }
 
   void tryBc7(std::optional<double> psnr) {
-    constexpr double kOptimism = 0.3;  // of the error of uniform bricks with as many bits
+    constexpr double kOptimism = 0.1;  // of the error of uniform bricks with as many bits
     const auto multiplier = multiplierAt(psnr);
     const int effort = refinesBc7(psnr) ? 0 : quality_.effort;
     forEachBrick([&](std::size_t i, Candidate& candidate) {
@@ -153,7 +163,8 @@ class GridChooser {
       const auto& tried = bricks_[i].tried;
       const auto two = std::find_if(tried.begin(), tried.end(),
                                     [](const Fit& fit) { return fit.encoding == format::uniformEncoding(2); });
-      if (!mayPay(i, kBc7Bytes + maskBytes(i), two->squaredError * kOptimism, multiplier)) return;
+      const Choice& twoBits = choices_[i][static_cast<std::size_t>(two - tried.begin())];
+      if (!mayPay(i, kBc7Bytes + maskBytes(i), twoBits.squaredError * kOptimism, multiplier)) return;
       encodeBc7BestAxis(source(i), effort, candidate);
       add(i, candidate);
     });
@@ -203,7 +214,7 @@ class GridChooser {
     float worst = 0;
     std::uint64_t voxels = 0;
     for (std::size_t i = 0; i < bricks_.size(); ++i) {
-      error += choices_[i].back().squaredError;
+      error += bricks_[i].tried.back().squaredError;
       worst = std::max(worst, choices_[i].back().maxError);
       voxels += counts_[i];
     }
@@ -218,20 +229,30 @@ class GridChooser {
     result.bricks.resize(bricks_.size());
     forEachBrick([&](std::size_t i, Candidate& candidate) { takeBrick(i, chosen[i], candidate, result.bricks[i]); });
     for (std::size_t i = 0; i < bricks_.size(); ++i) {
-      const Choice& choice = choices_[i][chosen[i]];
-      result.squaredError += choice.squaredError;
-      result.maxError = std::max(result.maxError, choice.maxError);
+      const Fit& fit = bricks_[i].tried[chosen[i]];
+      result.squaredError += fit.squaredError;
+      result.maxError = std::max(result.maxError, fit.maxError);
     }
     return result;
   }
 
+  // The cheapest bricks that keep to what was asked.
+  ChosenGrid settle(const std::string& where) {
+    ChosenGrid result = take(solveOrThrow(quality_.psnr, where));
+    while (depth_ && !depth_->holds(result.bricks)) result = take(solveOrThrow(quality_.psnr, where));
+    return result;
+  }
+
  private:
+  // Distortion a squared error, of errors without pattern.
+  double noiseDistortion() const { return depth_ ? DepthGoal::kDistortionOfNoise : 1; }
   double rmseAt(double psnr) const {
     return (static_cast<double>(grid_.max) - static_cast<double>(grid_.min)) / std::pow(10.0, psnr / 20.0);
   }
   // The largest error that a voxel may have.
   float errorLimit(std::optional<double> psnr) const {
     float limit = quality_.maxError.value_or(std::numeric_limits<float>::infinity());
+    if (depth_) return std::min(limit, depth_->limit());
     if (psnr) limit = std::min(limit, static_cast<float>(kOutlierLimit * rmseAt(*psnr)));
     return limit;
   }
@@ -296,22 +317,23 @@ class GridChooser {
       const std::uint32_t encoding = bricks_[i].tried[choice].encoding;
       if (encoding < format::kEncodingBc7Z || encoding > format::kEncodingBc7X) return;
       encodeBc7(source(i), encoding, quality_.effort, candidate);
-      if (candidate.squaredError < choices_[i][choice].squaredError) add(i, candidate);
+      if (candidate.squaredError < bricks_[i].tried[choice].squaredError) add(i, candidate);
     });
   }
 
   void add(std::size_t i, const Candidate& candidate) {
-    add(i, static_cast<const Fit&>(candidate));
+    add(i, candidate, depth_ ? DepthGoal::distortion(source(i), candidate) : candidate.squaredError);
     if (!format::isBc7(candidate.encoding)) return;
     bricks_[i].bc7.insert(bricks_[i].bc7.end(), candidate.payload.begin(), candidate.payload.begin() + kBc7Bytes);
   }
-  void add(std::size_t i, const Fit& fit) {
+  // `distortion`: what the allocator trades for bytes.
+  void add(std::size_t i, const Fit& fit, double distortion) {
     if (choices_[i].size() == 1) {
       choices_[i].reserve(kUsualChoices);
       bricks_[i].tried.reserve(kUsualChoices);
     }
     const std::uint32_t bytes = *format::brickBytes(fit.encoding) + (fit.texelMask ? 0 : maskBytes(i));
-    choices_[i].push_back({bytes, fit.squaredError, fit.maxError});
+    choices_[i].push_back({bytes, distortion, fit.maxError});
     bricks_[i].tried.push_back(fit);
   }
   template <class Function>
@@ -329,6 +351,7 @@ class GridChooser {
   std::vector<std::uint32_t> counts_;
   std::vector<char> quiet_;
   bool uniform16Tried_ = false;
+  std::optional<DepthGoal> depth_;
 };
 
 // The best PSNR, the same for every grid, at which the frame fits the budget; bisected on 1/64 dB. Sharing one PSNR is
@@ -396,8 +419,7 @@ std::vector<ChosenGrid> chooseEncodings(std::span<const ImportedGrid> grids, con
   std::vector<ChosenGrid> result(grids.size());
   for (std::size_t g = 0; g < grids.size(); ++g) {
     if (!choosers[g]) continue;
-    if (!quality.gpuBudget) chosen[g] = choosers[g]->solveOrThrow(quality.psnr, where(g));
-    result[g] = choosers[g]->take(chosen[g]);
+    result[g] = quality.gpuBudget ? choosers[g]->take(chosen[g]) : choosers[g]->settle(where(g));
     choosers[g].reset();
   }
   return result;

@@ -15,9 +15,15 @@
 
 namespace billow::compiler {
 
+enum class Metric {
+  voxel,  // active voxels: 20 log10((max - min) / rmse)
+  depth,  // line integrals along nine directions: DepthError::psnr()
+};
+
 // What the user asks of every grid in every frame. All that are given hold.
 struct Quality {
-  std::optional<double> psnr = 45.0;       // dB; 20 log10((max - min) / rmse) over active voxels
+  std::optional<double> psnr = 45.0;       // dB, by the metric
+  Metric metric = Metric::voxel;           // depth needs a psnr, and no gpuBudget
   std::optional<float> maxError;           // largest |reconstructed - source|, in the grid's own unit
   std::optional<std::uint64_t> gpuBudget;  // bytes of a frame's grids together; then the PSNR is the best that fits
   int effort = 1;                          // of the BC7 encoder, 0 to 9
@@ -47,7 +53,7 @@ std::vector<ChosenGrid> chooseEncodings(std::span<const ImportedGrid> grids, con
 
 struct Choice {
   std::uint32_t bytes = 0;
-  double squaredError = 0;
+  double squaredError = 0;  // or what else is traded for bytes, as the metric says
   float maxError = 0;
 };
 

@@ -1,0 +1,70 @@
+#include "choose/depth_goal.h"
+
+#include <cmath>
+
+#include "billow/format/brick.h"
+#include "metric/depth_distortion.h"
+#include "metric/depth_error.h"
+#include "parallel.h"
+
+namespace billow::compiler {
+namespace {
+
+// Of a grid's range. A tighter one costs bytes and a looser one pictures (spec/rationale.md).
+constexpr double kVoxelLimit = 0.05;
+
+// In dB: asked for beyond the shortfall, so that the next measure is likely the last.
+constexpr double kStep = 0.02;
+
+// `brick` is a ChosenBrick or a Candidate, with a payload of its encoding's size at least.
+template <class Brick>
+void decode(const Brick& brick, const format::Mask3& active, float background, format::Values& values) {
+  format::Node3 node{};
+  node.brick = brick.encoding << format::kEncodingShift;
+  node.mask = brick.texelMask ? format::kMaskTexel : 0;
+  node.lo = brick.lo;
+  node.scale = brick.scale;
+  format::Mask3 decoded;
+  const std::span<const std::byte> payload(brick.payload.data(), *format::brickBytes(brick.encoding));
+  format::decodeBrick(node, &active, payload, background, values, decoded);
+}
+
+}  // namespace
+
+DepthGoal::DepthGoal(const ImportedGrid& grid, double psnr) : grid_(grid), psnr_(psnr) {
+  const DepthError source = measureDepth(grid, grid);
+  rmse_ = source.range() / std::pow(10.0, psnr / 20);
+  lines_ = static_cast<double>(source.lines);
+}
+
+double DepthGoal::budget() const {
+  return rmse_ * rmse_ * lines_;
+}
+
+float DepthGoal::limit() const {
+  return static_cast<float>(kVoxelLimit * (static_cast<double>(grid_.max) - static_cast<double>(grid_.min)));
+}
+
+bool DepthGoal::holds(std::span<const ChosenBrick> bricks) {
+  ImportedGrid result = grid_;
+  parallelRanges(bricks.size(), 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) {
+      decode(bricks[i], grid_.leaves[i].active, grid_.background, result.leaves[i].values);
+    }
+  });
+  const double reached = measureDepth(grid_, result).psnr();
+  if (reached >= psnr_) return true;
+  rmse_ *= std::pow(10.0, (reached - psnr_ - kStep) / 20);
+  return false;
+}
+
+double DepthGoal::distortion(const BrickSource& brick, const Candidate& candidate) {
+  format::Values error;
+  decode(candidate, *brick.active, brick.tile, error);
+  for (std::uint32_t v = 0; v < format::kBrickVoxels; ++v) {
+    error[v] = format::maskBit(*brick.active, v) ? error[v] - (*brick.values)[v] : 0;
+  }
+  return depthDistortion(error);
+}
+
+}  // namespace billow::compiler
