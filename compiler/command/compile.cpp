@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -25,6 +26,7 @@ struct Arguments {
   std::optional<double> framesPerSecond;
   std::string metric = "voxel";
   int effort = 1;
+  format::Compression compression = format::Compression::small;
   unsigned threads = 0;
   bool json = false;
 };
@@ -87,6 +89,7 @@ int runCompile(const Arguments& arguments) {
   options.quality.maxError = arguments.maxError;
   options.quality.gpuBudget = arguments.gpuBudget;
   options.quality.effort = arguments.effort;
+  options.compression = arguments.compression;
   options.threads = arguments.threads;
   options.progress = drawProgress;
   const compiler::CompileReport report = compiler::compile(arguments.inputs, arguments.output, options, printWarning);
@@ -142,6 +145,12 @@ void addCompile(CLI::App& app, Run& run) {
   command->add_option("--effort", arguments->effort, "0 fastest to 9 smallest")
       ->check(CLI::Range(0, 9))
       ->capture_default_str();
+  command
+      ->add_option("--compress", arguments->compression,
+                   "small: fewest bytes on disk; fast: zstd, read several times as fast [small]")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, format::Compression>{
+          {"small", format::Compression::small}, {"fast", format::Compression::fast}}))
+      ->type_name("HOW");
   command->add_option("--threads", arguments->threads, "Threads to use [all cores]; the pack does not depend on it")
       ->check(CLI::Range(1u, 1024u))
       ->type_name("N");

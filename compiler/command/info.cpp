@@ -13,6 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr const char* kCodecNames[] = {"raw", "zstd", "model"};
 constexpr const char* kStreamNames[format::kStreamCount] = {"bricks", "masks", "node5", "node4", "node3", "children"};
 constexpr const char* kClassNames[format::kBrickClassCount] = {"bc7", "uniform", "local", "coarse"};
 
@@ -75,6 +76,8 @@ Json toJson(const PackSummary& pack) {
   json["disk"]["pages"] = pack.storedPageBytes;
   json["pages"]["count"] = pack.pageCount;
   json["pages"]["rawBytes"] = pack.rawPageBytes;
+  for (std::size_t i = 0; i < pack.pagesByCodec.size(); ++i)
+    json["pages"]["codecs"][kCodecNames[i]] = pack.pagesByCodec[i];
   for (std::uint32_t i = 0; i < format::kStreamCount; ++i) json["pages"][kStreamNames[i]] = pack.rawByStream[i];
   for (std::uint32_t i = 0; i < format::kEncodingCount; ++i) json["encodings"][kEncodingKeys[i]] = pack.encodings[i];
   const Json info = Json::parse(pack.infoJson, nullptr, false);
@@ -156,6 +159,11 @@ void printLargestFrame(const VolumeSummary& volume) {
 void printText(const PackSummary& pack) {
   fmt::print("{}: {} (pages {}, {} when unpacked; tables {})\n", pack.path, size(pack.fileBytes),
              size(pack.storedPageBytes), size(pack.rawPageBytes), size(pack.tableBytes));
+  std::string codecs;
+  for (std::size_t i = 0; i < pack.pagesByCodec.size(); ++i) {
+    if (pack.pagesByCodec[i] > 0) codecs += fmt::format("  {} {}", kCodecNames[i], pack.pagesByCodec[i]);
+  }
+  if (!codecs.empty()) fmt::print("Pages by codec:{}\n", codecs);
   std::string encodings;
   for (std::uint32_t i = 0; i < format::kEncodingCount; ++i) {
     if (pack.encodings[i] > 0) encodings += fmt::format("  {} {}", kEncodingKeys[i], pack.encodings[i]);

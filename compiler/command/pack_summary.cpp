@@ -78,6 +78,7 @@ format::Result<PackSummary> summarise(const std::string& path) {
   for (const format::PageRecord& page : pack->pages()) {
     summary.storedPageBytes += page.storedSize;
     summary.rawPageBytes += page.rawSize;
+    ++summary.pagesByCodec.at(page.codec);  // an open pack has no codec that is not known
     for (std::uint32_t s = 0; s < format::kStreamCount; ++s) {
       summary.rawByStream[s] += std::uint64_t{page.streams[s].count} * format::kStreamItemBytes[s];
     }

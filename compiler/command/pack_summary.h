@@ -46,6 +46,7 @@ struct PackSummary {
   std::uint64_t rawPageBytes = 0;
   std::uint64_t pageCount = 0;
   std::array<std::uint64_t, format::kStreamCount> rawByStream{};
+  std::array<std::uint64_t, 3> pagesByCodec{};
   std::array<std::uint64_t, format::kEncodingCount> encodings{};  // stored Node3s by encoding
   std::string infoJson;
   std::vector<VolumeSummary> volumes;

@@ -60,6 +60,7 @@ std::string settingsJson(const CompileOptions& options) {
   nlohmann::ordered_json info;
   info["generator"] = "billow " BILLOW_VERSION;
   info["quality"]["effort"] = options.quality.effort;
+  info["compression"] = options.compression == format::Compression::small ? "small" : "fast";
   if (options.quality.psnr) info["quality"]["psnr"] = *options.quality.psnr;
   if (options.quality.metric == Metric::depth) info["quality"]["metric"] = "depth";
   if (options.quality.maxError) info["quality"]["maxError"] = static_cast<double>(*options.quality.maxError);

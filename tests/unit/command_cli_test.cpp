@@ -27,11 +27,28 @@ TEST(Cli, HelpNamesEveryCommandAndItsExitCodes) {
 TEST(Cli, WrongCommandLinesExitWithOne) {
   for (const char* line : {"", "frobnicate", "compile", "compile x.vdb", "compile x.vdb -o y.blw --psnr forty",
                            "compile x.vdb -o y.blw --frames 9-1", "compile x.vdb -o y.blw --psnr 45 --gpu-budget 1MB",
-                           "compile x.vdb -o y.blw --missing maybe", "validate", "validate a.blw --format yaml"}) {
+                           "compile x.vdb -o y.blw --missing maybe", "compile x.vdb -o y.blw --compress tiny",
+                           "validate", "validate a.blw --format yaml"}) {
     const CommandResult result = billow(line);
     EXPECT_EQ(result.code, 1) << line << "\n" << result.err;
     EXPECT_FALSE(result.err.empty()) << line;
   }
+}
+
+TEST(Cli, CompressesAsAskedAndSaysSo) {
+  const TempFolder folder;
+  std::map<std::string, nlohmann::json> infos;
+  for (const std::string how : {"small", "fast"}) {
+    const std::string pack = folder / (how + ".blw");
+    ASSERT_EQ(billow("compile " + quoted(sampleFire()) + " --compress " + how + " -o " + quoted(pack)).code, 0);
+    EXPECT_EQ(billow("validate " + quoted(pack)).code, 0);
+    infos[how] = nlohmann::json::parse(billow("info --json " + quoted(pack)).out);
+    EXPECT_EQ(infos[how]["info"]["compression"], how);
+  }
+  EXPECT_GT(infos["small"]["pages"]["codecs"]["model"], 0);
+  EXPECT_EQ(infos["fast"]["pages"]["codecs"]["model"], 0);
+  EXPECT_GT(infos["fast"]["pages"]["codecs"]["zstd"], 0);
+  EXPECT_LT(infos["small"]["disk"]["pages"], infos["fast"]["disk"]["pages"]);
 }
 
 TEST(Cli, MissingFilesExitWithTwoAndAreNamed) {

@@ -49,7 +49,8 @@ class Bc7Model {
   template <class Coder>
   void code(Coder& coder, std::byte* block) {
     const auto low = std::to_integer<std::uint32_t>(block[0]) | 256;
-    const std::uint32_t mode = coder.symbol(mode_[modeBefore_], static_cast<std::uint32_t>(std::countr_zero(low)));
+    const auto first = static_cast<std::uint32_t>(std::countr_zero(low));
+    const std::uint32_t mode = std::min(coder.symbol(mode_[modeBefore_], first), 8u);
     modeBefore_ = mode;
     BlockBits bits(block);
     if (mode >= 8) {
