@@ -142,8 +142,9 @@ struct BrickSource {
 // Each fills `out` whole (payload only as far as it is used).
 // Deterministic, thread-safe, no allocation.
 void encodeConstant(const BrickSource& brick, Candidate& out);
+// `effort` from 0, the fastest, to 9; bc7_block.cpp says what each tries.
 void encodeBc7(const BrickSource& brick, std::uint32_t encoding, int effort, Candidate& out);
-// The packed axis that fits best is found by a cheap test, and only that one is encoded in full.
+// Along the packed axis that fits best: up to effort 2 found by a cheap test, from 3 on by encoding all.
 void encodeBc7BestAxis(const BrickSource& brick, int effort, Candidate& out);
 // Of `bits` 1 to 8, or 16.
 void encodeUniform(const BrickSource& brick, std::uint32_t bits, Candidate& out);

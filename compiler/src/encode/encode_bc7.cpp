@@ -19,24 +19,8 @@ float totalError(const Bc7Fits& fits) {
   return total;
 }
 
-// Of the three encodings the one that mode 6 serves best at its least effort.
-std::uint32_t promisingAxis(const BlockTexels arranged[3]) {
-  std::uint32_t best = 0;
-  float least = 0;
-  for (std::uint32_t i = 0; i < 3; ++i) {
-    Bc7Fits fits;
-    fitMode6(arranged[i], Bc7Search{}, fits);
-    const float error = totalError(fits);
-    if (i == 0 || error < least) {
-      least = error;
-      best = i;
-    }
-  }
-  return best;
-}
-
-void fitBlocks(const BlockTexels& texels, const Bc7Search& search, Bc7Fits& fits) {
-  fitMode6(texels, search, fits);
+// Betters what mode 6 fitted.
+void tryOtherModes(const BlockTexels& texels, const Bc7Search& search, Bc7Fits& fits) {
   if (search.rotations > 0 && totalError(fits) > 0) tryModes4And5(texels, search, fits);
   if (search.partitions > 0 && totalError(fits) > 0) tryMode7(texels, search, fits);
 }
@@ -92,7 +76,8 @@ void solveTogether(const BrickSource& brick, const Bc7Search& search, format::Te
     BlockTexels arranged;
     arrange(targets, axis, arranged);
     Bc7Fits fits;
-    fitBlocks(arranged, search, fits);
+    fitMode6(arranged, search, fits);
+    tryOtherModes(arranged, search, fits);
     store(brick, out.encoding, range, fits, texels, solved);
     if (!(solved.squaredError < out.squaredError)) return;
     out = solved;
@@ -104,10 +89,27 @@ void encodeAxis(const BrickSource& brick, const BrickTargets& targets, std::uint
   BlockTexels arranged;
   arrange(targets, format::packedAxis(encoding), arranged);
   Bc7Fits fits;
-  fitBlocks(arranged, search, fits);
+  fitMode6(arranged, search, fits);
+  tryOtherModes(arranged, search, fits);
   format::Texels texels;
   store(brick, encoding, targets.range, fits, texels, out);
   solveTogether(brick, search, texels, out);
+}
+
+// Of the three packed axes only the one that mode 6 serves best goes on to the other modes.
+void encodePromisingAxis(const BrickSource& brick, const BrickTargets& targets, const Bc7Search& search,
+                         Candidate& out) {
+  BlockTexels arranged[3];
+  Bc7Fits fits[3];
+  std::uint32_t best = 0;
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    arrange(targets, axisOf(i), arranged[i]);
+    fitMode6(arranged[i], search, fits[i]);
+    if (totalError(fits[i]) < totalError(fits[best])) best = i;
+  }
+  tryOtherModes(arranged[best], search, fits[best]);
+  format::Texels texels;
+  store(brick, format::kEncodingBc7Z + best, targets.range, fits[best], texels, out);
 }
 
 }  // namespace
@@ -120,13 +122,7 @@ void encodeBc7BestAxis(const BrickSource& brick, int effort, Candidate& out) {
   const BrickTargets targets(brick);
   const Bc7Search search = bc7Search(effort);
   if (!search.everyAxis) {
-    BlockTexels arranged[3];
-    for (std::uint32_t i = 0; i < 3; ++i) arrange(targets, axisOf(i), arranged[i]);
-    const std::uint32_t best = promisingAxis(arranged);
-    Bc7Fits fits;
-    fitBlocks(arranged[best], search, fits);
-    format::Texels texels;
-    store(brick, format::kEncodingBc7Z + best, targets.range, fits, texels, out);
+    encodePromisingAxis(brick, targets, search, out);
     return;
   }
   for (std::uint32_t i = 0; i < 3; ++i) {
