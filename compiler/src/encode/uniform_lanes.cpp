@@ -34,14 +34,14 @@ LevelSums sumNearest(const ActiveValues& active, const Levels& levels) {
   const V inverse = all(levels.step > 0 ? 1 / levels.step : 0);
   EightSums level, levelSquared, product, place, error;
   const auto add = [&](std::uint32_t i, std::uint32_t p, M counts) {
-    const V t = load(active.place + i);
+    const V t = hn::IfThenElseZero(counts, load(active.place + i));  // beyond the count lies anything, NaN too
     const V nearest = round(clamp(hn::Mul(hn::Sub(t, first), inverse), 0, levels.last));
     const V off = hn::Sub(t, hn::Add(first, hn::Mul(step, nearest)));
     const V l = hn::IfThenElseZero(counts, nearest);
     level.part[p] = hn::Add(level.part[p], l);
     levelSquared.part[p] = hn::Add(levelSquared.part[p], hn::Mul(l, l));
     product.part[p] = hn::Add(product.part[p], hn::Mul(l, t));
-    place.part[p] = hn::Add(place.part[p], hn::IfThenElseZero(counts, t));
+    place.part[p] = hn::Add(place.part[p], t);
     error.part[p] = hn::Add(error.part[p], hn::IfThenElseZero(counts, hn::Mul(off, off)));
   };
   const M whole = hn::FirstN(FloatLanes(), kLanes);
