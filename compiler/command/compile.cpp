@@ -115,7 +115,7 @@ void addCompile(CLI::App& app, Run& run) {
   CLI::Option* psnr =
       command
           ->add_option("--psnr", arguments->psnr,
-                       "Least PSNR of every grid in every frame, over active voxels [45 unless --max-error or "
+                       "Least PSNR of every grid in every frame, over active voxels [47 unless --max-error or "
                        "--gpu-budget is given]")
           ->check(finiteNumber())
           ->check(CLI::Range(1.0, 200.0))

@@ -22,7 +22,7 @@ enum class Metric {
 
 // What the user asks of every grid in every frame. All that are given hold.
 struct Quality {
-  std::optional<double> psnr = 45.0;       // dB, by the metric
+  std::optional<double> psnr = 47.0;       // dB, by the metric
   Metric metric = Metric::voxel;           // depth needs a psnr, and no gpuBudget
   std::optional<float> maxError;           // largest |reconstructed - source|, in the grid's own unit
   std::optional<std::uint64_t> gpuBudget;  // bytes of a frame's grids together; then the PSNR is the best that fits
