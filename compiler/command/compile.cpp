@@ -35,25 +35,33 @@ std::string psnrText(double psnr) {
   return std::isfinite(psnr) ? fmt::format("{:.2f} dB", psnr) : "exact";
 }
 
-std::string bricksText(const compiler::GridReport& grid) {
-  std::array<std::uint64_t, format::kBrickClassCount> classes{};
-  for (std::uint32_t e = 1; e < format::kEncodingCount; ++e) {
-    classes[static_cast<std::uint32_t>(format::brickClass(e))] += grid.bricks[e];
+// A line for each encoding that the grid's bricks have: how many, what they take, and their part of the error.
+void printEncodings(const compiler::GridReport& grid) {
+  double error = 0;
+  for (const compiler::EncodingTotal& total : grid.encodings) error += total.squaredError;
+  for (std::uint32_t e = 0; e < format::kEncodingCount; ++e) {
+    const compiler::EncodingTotal& total = grid.encodings[e];
+    if (total.bricks == 0) continue;
+    const auto bytes = static_cast<double>(total.bricks * *format::brickBytes(e));
+    fmt::print("  {:<22} {:>10} {:>12.1f} KB {:>9.1f} %\n", kEncodingKeys[e], total.bricks, bytes * 1e-3,
+               error > 0 ? 100 * total.squaredError / error : 0.0);
   }
-  return fmt::format("{} / {} / {} / {} / {}", grid.bricks[format::kEncodingConstant], classes[0], classes[1],
-                     classes[2], classes[3]);
 }
 
 void printReport(const compiler::CompileReport& report, const std::string& output) {
   fmt::print("{}: {} frame{}, {:.2f} MB\n", output, report.frames, report.frames == 1 ? "" : "s",
              static_cast<double>(report.fileBytes) * 1e-6);
-  fmt::print("{:<24} {:>6} {:>13} {:>10} {:>12} {:>12}   {}\n", "grid", "frames", "active voxels", "worst PSNR",
-             "max error", "GPU/frame", "bricks: constant / BC7 / uniform / local / coarse");
+  fmt::print("{:<24} {:>6} {:>13} {:>10} {:>12} {:>12}\n", "grid", "frames", "active voxels", "worst PSNR", "max error",
+             "GPU/frame");
   for (const compiler::GridReport& grid : report.grids) {
     const std::string name = grid.volume.empty() ? grid.grid : grid.volume + "/" + grid.grid;
-    fmt::print("{:<24} {:>6} {:>13} {:>10} {:>12.4g} {:>9.1f} KB   {}\n", name, grid.frames, grid.activeVoxels,
-               psnrText(grid.worstPsnr), grid.maxError, static_cast<double>(grid.largestFrameGpuBytes) * 1e-3,
-               bricksText(grid));
+    fmt::print("{:<24} {:>6} {:>13} {:>10} {:>12.4g} {:>9.1f} KB\n", name, grid.frames, grid.activeVoxels,
+               psnrText(grid.worstPsnr), grid.maxError, static_cast<double>(grid.largestFrameGpuBytes) * 1e-3);
+  }
+  for (const compiler::GridReport& grid : report.grids) {
+    if (grid.frames == 0) continue;
+    fmt::print("\n{:<24} {:>10} {:>15} {:>11}\n", grid.grid, "bricks", "bytes", "of error");
+    printEncodings(grid);
   }
 }
 
@@ -72,7 +80,10 @@ nlohmann::ordered_json reportJson(const compiler::CompileReport& report, const s
     row["worstPsnr"] = std::isfinite(grid.worstPsnr) ? nlohmann::ordered_json(grid.worstPsnr) : nullptr;
     row["maxError"] = grid.maxError;
     row["largestFrameGpuBytes"] = grid.largestFrameGpuBytes;
-    for (std::size_t e = 0; e < grid.bricks.size(); ++e) row["bricks"][kEncodingKeys[e]] = grid.bricks[e];
+    for (std::size_t e = 0; e < grid.encodings.size(); ++e) {
+      row["bricks"][kEncodingKeys[e]] = grid.encodings[e].bricks;
+      row["squaredError"][kEncodingKeys[e]] = grid.encodings[e].squaredError;
+    }
     json["grids"].push_back(row);
   }
   return json;

@@ -42,7 +42,7 @@ struct EncodedFrame {
 // What a grid in a frame became, for frames that hold the same again.
 struct Written {
   format::GridFrame record;
-  std::array<std::uint64_t, format::kEncodingCount> bricks{};
+  std::array<EncodingTotal, format::kEncodingCount> encodings{};
 };
 
 // Hash of all that the tree of a grid depends on: voxels, tiles and background, not the transform.
@@ -205,7 +205,10 @@ class Compiler {
     tables_.pageLists.insert(tables_.pageLists.end(), pages.begin(), pages.end());
     Written& entry = written_[content];
     entry.record = record;
-    for (const ChosenBrick& brick : frame.chosen[g].bricks) ++entry.bricks[brick.encoding];
+    for (const ChosenBrick& brick : frame.chosen[g].bricks) {
+      ++entry.encodings[brick.encoding].bricks;
+      entry.encodings[brick.encoding].squaredError += brick.squaredError;
+    }
     return record;
   }
 
@@ -231,8 +234,11 @@ class Compiler {
     if ((record.flags & format::kGridPresent) == 0) return;
     ++report.frames;
     report.activeVoxels += record.activeVoxels;
-    const auto& bricks = written_.at(frame.contents[g]).bricks;
-    for (std::size_t e = 0; e < bricks.size(); ++e) report.bricks[e] += bricks[e];
+    const auto& encodings = written_.at(frame.contents[g]).encodings;
+    for (std::size_t e = 0; e < encodings.size(); ++e) {
+      report.encodings[e].bricks += encodings[e].bricks;
+      report.encodings[e].squaredError += encodings[e].squaredError;
+    }
     report.worstPsnr = std::min(report.worstPsnr, format::psnr(record));
     report.maxError = std::max(report.maxError, record.maxError);
     report.largestFrameGpuBytes = std::max(report.largestFrameGpuBytes, format::gpuBytes(record).total());

@@ -23,12 +23,18 @@ struct CompileOptions {
   std::function<void(std::size_t done, std::size_t total)> progress;
 };
 
+// What one encoding holds.
+struct EncodingTotal {
+  std::uint64_t bricks = 0;
+  double squaredError = 0;  // over their active voxels
+};
+
 struct GridReport {
   std::string volume, grid;
   std::uint32_t frames = 0;  // in which the grid is present
   std::uint64_t activeVoxels = 0;
-  std::array<std::uint64_t, format::kEncodingCount> bricks{};  // chosen, before sharing
-  double worstPsnr = 0;                                        // dB, over frames; infinite where exact
+  std::array<EncodingTotal, format::kEncodingCount> encodings{};  // as chosen, before sharing
+  double worstPsnr = 0;                                           // dB, over frames; infinite where exact
   float maxError = 0;
   std::uint64_t largestFrameGpuBytes = 0;
 };

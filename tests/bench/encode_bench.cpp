@@ -2,6 +2,7 @@
 // environment variable BILLOW_DATA names a folder of sequences, on the middle frames of real ones.
 #include <benchmark/benchmark.h>
 
+#include <array>
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
@@ -51,11 +52,20 @@ void registerAll(const Corpus& corpus) {
     add("bc7BestAxis/effort" + std::to_string(effort),
         [effort](const auto& brick, compiler::Candidate& out) { compiler::encodeBc7BestAxis(brick, effort, out); });
   }
-  add("bc4",
-      [](const auto& brick, compiler::Candidate& out) { compiler::encodeBc4(brick, format::kEncodingBc4Z, out); });
-  add("bc4BestAxis", compiler::encodeBc4BestAxis);
-  add("r8", compiler::encodeR8);
-  add("r16", compiler::encodeR16);
+  add("uniform1to8", [](const auto& brick, compiler::Candidate& out) {
+    std::array<compiler::Fit, 8> fits;
+    compiler::fitUniforms(brick, fits);
+    out.squaredError = fits[7].squaredError;
+  });
+  for (const std::uint32_t bits : {2u, 4u, 8u, 16u}) {
+    add("uniform" + std::to_string(bits),
+        [bits](const auto& brick, compiler::Candidate& out) { compiler::encodeUniform(brick, bits, out); });
+  }
+  for (std::uint32_t bits = 2; bits <= 6; bits += 2) {
+    add("local" + std::to_string(bits),
+        [bits](const auto& brick, compiler::Candidate& out) { compiler::encodeLocal(brick, bits, out); });
+  }
+  add("coarse", compiler::encodeCoarse);
 }
 
 }  // namespace

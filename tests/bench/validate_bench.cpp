@@ -38,8 +38,8 @@ void addBrick(tests::GridFrameBuilder& builder, std::array<std::uint32_t, 3> cel
   const std::uint32_t kind = random() % 20;
   const std::uint32_t encoding = kind < 6    ? kEncodingConstant
                                  : kind < 14 ? kEncodingBc7Z + kind % 3
-                                 : kind < 19 ? kEncodingBc4Z + kind % 3
-                                             : kEncodingR8;
+                                 : kind < 19 ? kEncodingLocal2 + kind % 5
+                                             : kEncodingUniform8;
   if (encoding == kEncodingConstant) return builder.brick(cell, encoding, {}, 1, 0, maskWord, mask);
   builder.brick(cell, encoding, brickBytesLike(*brickBytes(encoding), random), 0.1f, 0.002f, maskWord, mask);
 }

@@ -98,7 +98,7 @@ TEST(InfoCommand, TellsGridsFramesAndBytes) {
   const auto info = nlohmann::json::parse(result.out);
   EXPECT_EQ(info["fileBytes"], tests::samplePack().size());
   EXPECT_EQ(info["encodings"]["constant"], 2);
-  EXPECT_EQ(info["encodings"]["bc4x"], 1);
+  EXPECT_EQ(info["encodings"]["coarse"], 1);
   EXPECT_EQ(info["info"]["generator"], "test");
   const auto& volume = info["volumes"][0];
   EXPECT_EQ(volume["name"], "cloud");

@@ -27,10 +27,10 @@ std::vector<std::byte> smallFire() {
       GridFrameBuilder smoke(writer, 0), flames(writer, 0);
       for (std::uint32_t i = 0; i < 12 + frame * 6; ++i) {
         const std::array<std::uint32_t, 3> cell{10 + i % 3, 10 + i / 3 % 2, 10 + i / 6};
-        smoke.brick(cell, i % 2 == 0 ? format::kEncodingBc7Z : format::kEncodingR8,
+        smoke.brick(cell, i % 2 == 0 ? format::kEncodingBc7Z : format::kEncodingUniform8,
                     randomBytes(i % 2 == 0 ? 128 : 512, i), 0, 0.004f, format::kMaskAll);
         if (i % 3 == 1) {
-          flames.brick(cell, format::kEncodingBc4Z, randomBytes(256, i), 0, 0.002f, format::kMaskAll);
+          flames.brick(cell, format::localEncoding(3), randomBytes(224, i), 0, 0.0003f, format::kMaskAll);
         }
       }
       tables.gridFrames.push_back(smoke.finish(tables));

@@ -67,6 +67,16 @@ std::vector<std::byte> results(const Brick& brick) {
     add(candidate.payload.data(), *format::brickBytes(candidate.encoding));
   };
   Candidate candidate;
+  for (std::uint32_t bits = 1; bits <= 16; bits += bits < 8 ? 1 : 8) {
+    compiler::encodeUniform(source, bits, candidate);
+    addCandidate(candidate);
+  }
+  for (std::uint32_t bits = 2; bits <= 6; ++bits) {
+    compiler::encodeLocal(source, bits, candidate);
+    addCandidate(candidate);
+  }
+  compiler::encodeCoarse(source, candidate);
+  addCandidate(candidate);
   for (int effort = 0; effort <= 9; effort += effort < 4 ? 1 : 5) {
     compiler::encodeBc7BestAxis(source, effort, candidate);
     addCandidate(candidate);

@@ -1,4 +1,4 @@
-// BC7 and BC4 blocks built bit by bit, in the order of the specification's fields, against values computed by hand.
+// BC7 blocks built bit by bit, in the order of the specification's fields, against values computed by hand.
 #include <gtest/gtest.h>
 
 #include <array>

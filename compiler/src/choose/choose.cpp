@@ -275,7 +275,7 @@ class GridChooser {
     } else if (bits != 0) {
       encodeUniform(source(i), bits, candidate);
     }
-    brick = {fit.encoding, fit.texelMask, fit.lo, fit.scale, {}};
+    brick = {fit.encoding, fit.texelMask, fit.lo, fit.scale, fit.squaredError, {}};
     brick.payload.assign(payload, payload + *format::brickBytes(fit.encoding));
   }
   // What a stored mask adds to brick i.

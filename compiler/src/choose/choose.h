@@ -34,6 +34,7 @@ struct ChosenBrick {
   bool texelMask = false;
   float lo = 0;
   float scale = 0;
+  double squaredError = 0;
   std::vector<std::byte> payload;
 };
 

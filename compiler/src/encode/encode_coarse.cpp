@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "encode/brick_lanes.h"
 
@@ -119,7 +120,8 @@ void encodeCoarse(const BrickSource& brick, Candidate& out) {
   const double width = (static_cast<double>(*greatest) - static_cast<double>(*least)) * unit;
   constexpr double kLargest = std::numeric_limits<float>::max();
   TexelRange range = {values.min, 0};
-  if (width > 0 && lo >= -kLargest && lo + width <= kLargest / 2) {
+  if (width / (64 * 255) >= static_cast<double>(std::numeric_limits<float>::min()) && lo >= -kLargest &&
+      lo + width <= kLargest / 2) {
     // A tenth of a step of the points is not seen.
     range = shorten(lo, width / (64 * 255), 64 * 255, width / 2550);
   }

@@ -1,6 +1,7 @@
 // Bricks whose cells of 4x4x2 voxels have ends of their own, and indices between them.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "encode/brick_lanes.h"
 #include "encode/local_lanes.h"
@@ -20,8 +21,8 @@ double reachBelow(const Cells& cells, double last) {
   return most;
 }
 
-// lo and scale with which the ends 0 to 255 reach from `below` under the range's least value to its greatest. Those of
-// coverRange() where that is not possible in single precision.
+// lo and scale with which the ends 0 to 255 reach from `below` under the range's least value to its greatest; false
+// where that is not possible in single precision.
 bool rangeOfEnds(ValueRange range, double below, std::uint32_t last, TexelRange& ends) {
   const auto low = static_cast<double>(range.min);
   const double width = static_cast<double>(range.max) - low;
@@ -30,7 +31,8 @@ bool rangeOfEnds(ValueRange range, double below, std::uint32_t last, TexelRange&
   const std::uint32_t largest = 255 * last;
   // A tenth of a step of the ends is not seen.
   ends = shorten(lo, (width + below * width) / largest, largest, width / 2550);
-  return ends.scale > 0 && std::isfinite(format::reconstruct(ends.lo, ends.scale, largest));
+  return ends.scale >= std::numeric_limits<float>::min() &&
+         std::isfinite(format::reconstruct(ends.lo, ends.scale, largest));
 }
 
 void writeBrick(const CellFit& fit, std::uint32_t bits, std::byte* payload) {

@@ -1,5 +1,6 @@
 // Bricks that store an index a voxel, all on one scale: of 1 to 8 bits, or of 16.
 #include <cmath>
+#include <limits>
 
 #include "encode/uniform_lanes.h"
 
@@ -54,6 +55,8 @@ TexelRange fitRange(const ActiveValues& active, std::uint32_t first, std::uint32
   const auto low = static_cast<double>(active.range.min);
   const double width = static_cast<double>(active.range.max) - low;
   const double step = static_cast<double>(levels.step) * width;
+  // Among denormals a step is no longer as fine as its least squares.
+  if (step < static_cast<double>(std::numeric_limits<float>::min())) return covering;
   const double lo = low + static_cast<double>(levels.first) * width - step * first;
   const double tolerance = std::sqrt(error / active.count / kRoundingShare) * width;
   const TexelRange fitted = shorten(lo, step, last, tolerance);

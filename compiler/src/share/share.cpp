@@ -37,6 +37,11 @@ std::uint32_t childBit(const std::array<std::uint32_t, 3>& at, std::uint32_t spa
   return (at[0] >> spanLog2 & mask) << (2 * log2) | (at[1] >> spanLog2 & mask) << log2 | (at[2] >> spanLog2 & mask);
 }
 
+// The nearest float whose lower 16 bits are 0. The mean serves drawing from afar; its low bits would be noise on disk.
+float upperHalf(float value) {
+  return std::bit_cast<float>((std::bit_cast<std::uint32_t>(value) + 0x8000u) & 0xffff0000u);
+}
+
 void growPages(std::vector<std::uint32_t>& pages, std::uint32_t page) {
   if (pages.empty() || pages.back() != page) pages.push_back(page);
 }
@@ -157,7 +162,9 @@ class TreeBuilder {
     const float min = *std::min_element(lows, lows + kSums);
     const float max = *std::max_element(highs, highs + kSums);
     const double sum = ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]));
-    node.mean = std::clamp(static_cast<float>(sum / format::kBrickVoxels), min, max);
+    const float mean = std::clamp(static_cast<float>(sum / format::kBrickVoxels), min, max);
+    const float rounded = upperHalf(mean);
+    node.mean = min <= rounded && rounded <= max ? rounded : mean;
     const std::uint32_t index = intern(Stream::node3, &node, 1);
     nodes3_.push_back(index);
     return {index, min, max, static_cast<double>(node.mean)};
