@@ -2,14 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-#include <cstdio>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "command.h"
-#include "encoding_keys.h"
+#include "compile_report.h"
 #include "import_options.h"
 #include "progress.h"
 
@@ -22,7 +20,7 @@ struct Arguments {
   ImportArguments import;
   std::optional<double> psnr;
   std::optional<float> maxError;
-  std::optional<std::uint64_t> gpuBudget;
+  compiler::Budget budget;
   std::optional<double> framesPerSecond;
   std::string metric = "voxel";
   int effort = 1;
@@ -31,74 +29,16 @@ struct Arguments {
   bool json = false;
 };
 
-std::string psnrText(double psnr) {
-  return std::isfinite(psnr) ? fmt::format("{:.2f} dB", psnr) : "exact";
-}
-
-// A line for each encoding that the grid's bricks have: how many, what they take, and their part of the error.
-void printEncodings(const compiler::GridReport& grid) {
-  double error = 0;
-  for (const compiler::EncodingTotal& total : grid.encodings) error += total.squaredError;
-  for (std::uint32_t e = 0; e < format::kEncodingCount; ++e) {
-    const compiler::EncodingTotal& total = grid.encodings[e];
-    if (total.bricks == 0) continue;
-    const auto bytes = static_cast<double>(total.bricks * *format::brickBytes(e));
-    fmt::print("  {:<22} {:>10} {:>12.1f} KB {:>9.1f} %\n", kEncodingKeys[e], total.bricks, bytes * 1e-3,
-               error > 0 ? 100 * total.squaredError / error : 0.0);
-  }
-}
-
-void printReport(const compiler::CompileReport& report, const std::string& output) {
-  fmt::print("{}: {} frame{}, {:.2f} MB\n", output, report.frames, report.frames == 1 ? "" : "s",
-             static_cast<double>(report.fileBytes) * 1e-6);
-  fmt::print("{:<24} {:>6} {:>13} {:>10} {:>12} {:>12}\n", "grid", "frames", "active voxels", "worst PSNR", "max error",
-             "GPU/frame");
-  for (const compiler::GridReport& grid : report.grids) {
-    const std::string name = grid.volume.empty() ? grid.grid : grid.volume + "/" + grid.grid;
-    fmt::print("{:<24} {:>6} {:>13} {:>10} {:>12.4g} {:>9.1f} KB\n", name, grid.frames, grid.activeVoxels,
-               psnrText(grid.worstPsnr), grid.maxError, static_cast<double>(grid.largestFrameGpuBytes) * 1e-3);
-  }
-  for (const compiler::GridReport& grid : report.grids) {
-    if (grid.frames == 0) continue;
-    fmt::print("\n{:<24} {:>10} {:>15} {:>11}\n", grid.grid, "bricks", "bytes", "of error");
-    printEncodings(grid);
-  }
-}
-
-nlohmann::ordered_json reportJson(const compiler::CompileReport& report, const std::string& output) {
-  nlohmann::ordered_json json;
-  json["output"] = output;
-  json["frames"] = report.frames;
-  json["fileBytes"] = report.fileBytes;
-  json["grids"] = nlohmann::ordered_json::array();
-  for (const compiler::GridReport& grid : report.grids) {
-    nlohmann::ordered_json row;
-    row["volume"] = grid.volume;
-    row["grid"] = grid.grid;
-    row["frames"] = grid.frames;
-    row["activeVoxels"] = grid.activeVoxels;
-    row["worstPsnr"] = std::isfinite(grid.worstPsnr) ? nlohmann::ordered_json(grid.worstPsnr) : nullptr;
-    row["maxError"] = grid.maxError;
-    row["largestFrameGpuBytes"] = grid.largestFrameGpuBytes;
-    for (std::size_t e = 0; e < grid.encodings.size(); ++e) {
-      row["bricks"][kEncodingKeys[e]] = grid.encodings[e].bricks;
-      row["squaredError"][kEncodingKeys[e]] = grid.encodings[e].squaredError;
-    }
-    json["grids"].push_back(row);
-  }
-  return json;
-}
-
 int runCompile(const Arguments& arguments) {
   compiler::CompileOptions options;
   options.import = importOptions(arguments.import);
   options.import.framesPerSecond = arguments.framesPerSecond;
   if (arguments.psnr) options.quality.psnr = arguments.psnr;
   // An error bound or a budget alone replaces the default PSNR.
-  if ((arguments.maxError || arguments.gpuBudget) && !arguments.psnr) options.quality.psnr.reset();
+  if ((arguments.maxError || arguments.budget.any()) && !arguments.psnr) options.quality.psnr.reset();
   if (arguments.metric == "depth") options.quality.metric = compiler::Metric::depth;
   options.quality.maxError = arguments.maxError;
-  options.quality.gpuBudget = arguments.gpuBudget;
+  options.budget = arguments.budget;
   options.quality.effort = arguments.effort;
   options.compression = arguments.compression;
   options.threads = arguments.threads;
@@ -126,8 +66,8 @@ void addCompile(CLI::App& app, Run& run) {
   CLI::Option* psnr =
       command
           ->add_option("--psnr", arguments->psnr,
-                       "Least PSNR of every grid in every frame, over active voxels [47 unless --max-error or "
-                       "--gpu-budget is given]")
+                       "Least PSNR of every grid in every frame, over active voxels [47 unless an error or a budget "
+                       "is given]")
           ->check(finiteNumber())
           ->check(CLI::Range(1.0, 200.0))
           ->type_name("DB");
@@ -142,8 +82,15 @@ void addCompile(CLI::App& app, Run& run) {
                             ->needs(psnr)
                             ->capture_default_str();
   command
-      ->add_option("--gpu-budget", arguments->gpuBudget,
-                   "Largest GPU size of any frame, all grids together; the error is the least that fits")
+      ->add_option("--gpu-budget", arguments->budget.gpu,
+                   "GPU bytes of the whole pack, all frames and grids, at most; the error is the least that fits")
+      ->transform(CLI::AsSizeValue(false))
+      ->excludes(psnr)
+      ->excludes(metric)
+      ->type_name("BYTES");
+  command
+      ->add_option("--disk-budget", arguments->budget.disk,
+                   "Bytes of the file at most; the error is the least that fits")
       ->transform(CLI::AsSizeValue(false))
       ->excludes(psnr)
       ->excludes(metric)

@@ -1,10 +1,11 @@
-// The whole compile: plan -> import -> encode and choose (frames in parallel) -> share -> write (in frame order).
+// The whole compile: plan -> import -> try encodings (frames in parallel) -> choose -> share -> write (in frame order).
 #ifndef BILLOW_COMPILER_COMPILE_H
 #define BILLOW_COMPILER_COMPILE_H
 
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,27 +15,41 @@
 
 namespace billow::compiler {
 
+// Sizes that the pack keeps to, with the least error that fits; quality.psnr is then not looked at, quality.maxError
+// holds as well.
+struct Budget {
+  // Of all frames and grids together, what they share counted once (format::packGpuBytes).
+  std::optional<std::uint64_t> gpu;
+  std::optional<std::uint64_t> disk;  // the file's size
+  bool any() const { return gpu || disk; }
+};
+
 struct CompileOptions {
   ImportOptions import;
   Quality quality;
+  Budget budget;
   unsigned threads = 0;  // 0: as many as the machine has
   format::Compression compression = format::Compression::small;
-  // Called before the first frame and after each with the number done and the number in all, one call at a time.
+  // Called before the first frame and after each with the number done and the number in all, one call at a time. A
+  // budget takes several passes over the frames, each of which begins at 0.
   std::function<void(std::size_t done, std::size_t total)> progress;
 };
 
-// What one encoding holds.
-struct EncodingTotal {
-  std::uint64_t bricks = 0;
-  double squaredError = 0;  // over their active voxels
+// Bricks of one encoding.
+struct EncodingTally {
+  std::uint64_t bricks = 0;  // chosen, in all frames, before sharing
+  std::uint64_t reused = 0;  // of them, as the frame before held them
+  std::uint64_t bytes = 0;   // of those that are not reused
+  double squaredError = 0;   // over active voxels
+  std::uint64_t activeVoxels = 0;
 };
 
 struct GridReport {
   std::string volume, grid;
   std::uint32_t frames = 0;  // in which the grid is present
   std::uint64_t activeVoxels = 0;
-  std::array<EncodingTotal, format::kEncodingCount> encodings{};  // as chosen, before sharing
-  double worstPsnr = 0;                                           // dB, over frames; infinite where exact
+  std::array<EncodingTally, format::kEncodingCount> encodings{};
+  double worstPsnr = 0;  // dB, over frames; infinite where exact
   float maxError = 0;
   std::uint64_t largestFrameGpuBytes = 0;
 };
@@ -43,6 +58,7 @@ struct CompileReport {
   std::vector<GridReport> grids;
   std::size_t frames = 0;
   std::uint64_t fileBytes = 0;
+  std::uint64_t gpuBytes = 0;  // format::packGpuBytes
 };
 
 // Writes `output` whole or not at all. The bytes depend on inputs and options alone. Throws Error, std::system_error.

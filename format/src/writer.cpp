@@ -149,6 +149,12 @@ std::uint32_t PackWriter::append(Stream stream, const void* items, std::uint32_t
   return impl_->append(static_cast<std::uint32_t>(stream), items, count);
 }
 
+std::array<std::uint64_t, kStreamCount> PackWriter::itemCounts() const {
+  std::array<std::uint64_t, kStreamCount> counts{};
+  std::copy(impl_->total.begin(), impl_->total.end(), counts.begin());
+  return counts;
+}
+
 std::uint32_t PackWriter::pageOf(Stream stream, std::uint32_t index) const {
   const auto which = static_cast<std::uint32_t>(stream);
   const auto& pages = impl_->pages;

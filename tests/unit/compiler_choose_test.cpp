@@ -5,7 +5,7 @@
 #include <limits>
 #include <random>
 
-#include "choose/choose.h"
+#include "choose/decide.h"
 
 namespace billow::compiler {
 namespace {
@@ -152,21 +152,18 @@ TEST(Choose, KeepsTheLargestError) {
   }
 }
 
-TEST(Choose, FitsTheGpuBudgetAndSpendsIt) {
-  const std::vector<ImportedGrid> grids = {noisyGrid(40), noisyGrid(25)};
+TEST(Choose, ALowerMultiplierBuysLessErrorForMoreBytes) {
+  const ImportedGrid grid = noisyGrid(40);
   std::uint64_t last = 0;
   double lastError = 1e30;
-  for (const std::uint64_t budget : {12000u, 16000u, 24000u}) {
-    Quality quality;
-    quality.psnr.reset();
-    quality.gpuBudget = budget;
-    double error = 0;
+  for (const double multiplier : {1e-1, 1e-3, 1e-5, 1e-8}) {
+    const Goal goal = goalAt({multiplier, {1, 0}}, {});
+    GridTrials trials(grid, goal, 1, {});
+    const ChosenGrid chosen = decide(grid, goal, trials, {}, {}, "test");
     std::uint64_t bytes = 0;
-    for (const ChosenGrid& chosen : chooseEncodings(grids, quality, kNowhere)) {
-      error += chosen.squaredError;
-      for (const ChosenBrick& brick : chosen.bricks) bytes += brick.payload.size();
-    }
-    EXPECT_LT(bytes, budget);
+    for (const ChosenBrick& brick : chosen.bricks) bytes += brick.payload.size();
+    const double error = decodedError(grid, chosen);
+    EXPECT_NEAR(error, chosen.squaredError, 1e-9 * error);
     EXPECT_GT(bytes, last);
     EXPECT_LT(error, lastError);
     last = bytes;
@@ -185,9 +182,6 @@ TEST(Choose, NamesWhatCannotBeReached) {
     EXPECT_EQ(error.fault(), Fault::input);
     EXPECT_NE(std::string(error.what()).find("test: the error asked for is out of reach"), std::string::npos);
   }
-  quality.psnr.reset();
-  quality.gpuBudget = 10;
-  EXPECT_THROW(chooseEncodings(grids, quality, kNowhere), Error);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #ifndef BILLOW_FORMAT_WRITER_H
 #define BILLOW_FORMAT_WRITER_H
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -46,6 +47,8 @@ class PackWriter {
   // Appends `count` items and returns the global index of the first. All of one call lies in one page, so a call may
   // bring at most kMaxPageBytes (else std::length_error). A brick's units and a node's child list are one call each.
   std::uint32_t append(Stream stream, const void* items, std::uint32_t count);
+  // Items appended so far, by stream.
+  std::array<std::uint64_t, kStreamCount> itemCounts() const;
   // The page in which the stream's item lies (or will lie, while its page is open).
   std::uint32_t pageOf(Stream stream, std::uint32_t index) const;
 

@@ -1,0 +1,89 @@
+#include "compile_report.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "encoding_keys.h"
+
+namespace billow::command {
+namespace {
+
+using compiler::EncodingTally;
+using compiler::GridReport;
+using Json = nlohmann::ordered_json;
+
+std::string psnrText(double psnr) {
+  return std::isfinite(psnr) ? fmt::format("{:.2f} dB", psnr) : "exact";
+}
+
+std::string size(std::uint64_t bytes) {
+  const auto value = static_cast<double>(bytes);
+  if (value < 1e6) return fmt::format("{:.1f} kB", value * 1e-3);
+  return fmt::format("{:.2f} MB", value * 1e-6);
+}
+
+double rmse(const EncodingTally& tally) {
+  return tally.activeVoxels == 0 ? 0 : std::sqrt(tally.squaredError / static_cast<double>(tally.activeVoxels));
+}
+
+void printGrid(const GridReport& grid) {
+  fmt::print(
+      "\n{}{}{}: {} frame{}, {} active voxels, worst PSNR {}, largest error {:.4g}, at most {} on the GPU a frame\n",
+      grid.volume, grid.volume.empty() ? "" : "/", grid.grid, grid.frames, grid.frames == 1 ? "" : "s",
+      grid.activeVoxels, psnrText(grid.worstPsnr), grid.maxError, size(grid.largestFrameGpuBytes));
+  bool header = false;
+  for (std::size_t e = 0; e < grid.encodings.size(); ++e) {
+    const EncodingTally& tally = grid.encodings[e];
+    if (tally.bricks == 0) continue;
+    if (!header) fmt::print("  {:<10} {:>9} {:>9} {:>10} {:>11}\n", "encoding", "bricks", "reused", "stored", "rmse");
+    header = true;
+    fmt::print("  {:<10} {:>9} {:>9} {:>10} {:>11.4g}\n", kEncodingKeys[e], tally.bricks, tally.reused,
+               size(tally.bytes), rmse(tally));
+  }
+}
+
+Json toJson(const GridReport& grid) {
+  Json row;
+  row["volume"] = grid.volume;
+  row["grid"] = grid.grid;
+  row["frames"] = grid.frames;
+  row["activeVoxels"] = grid.activeVoxels;
+  row["worstPsnr"] = std::isfinite(grid.worstPsnr) ? Json(grid.worstPsnr) : Json(nullptr);
+  row["maxError"] = grid.maxError;
+  row["largestFrameGpuBytes"] = grid.largestFrameGpuBytes;
+  for (std::size_t e = 0; e < grid.encodings.size(); ++e) {
+    const EncodingTally& tally = grid.encodings[e];
+    row["bricks"][kEncodingKeys[e]] = tally.bricks;
+    if (tally.bricks == 0) continue;
+    Json& chosen = row["encodings"][kEncodingKeys[e]];
+    chosen["bricks"] = tally.bricks;
+    chosen["reused"] = tally.reused;
+    chosen["storedBytes"] = tally.bytes;
+    chosen["activeVoxels"] = tally.activeVoxels;
+    chosen["squaredError"] = tally.squaredError;
+    chosen["rmse"] = rmse(tally);
+  }
+  return row;
+}
+
+}  // namespace
+
+void printReport(const compiler::CompileReport& report, const std::string& output) {
+  fmt::print("{}: {} frame{}, {} on disk, {} on the GPU with all frames resident\n", output, report.frames,
+             report.frames == 1 ? "" : "s", size(report.fileBytes), size(report.gpuBytes));
+  for (const GridReport& grid : report.grids) printGrid(grid);
+}
+
+nlohmann::ordered_json reportJson(const compiler::CompileReport& report, const std::string& output) {
+  Json json;
+  json["output"] = output;
+  json["frames"] = report.frames;
+  json["fileBytes"] = report.fileBytes;
+  json["gpuBytes"] = report.gpuBytes;
+  json["grids"] = Json::array();
+  for (const GridReport& grid : report.grids) json["grids"].push_back(toJson(grid));
+  return json;
+}
+
+}  // namespace billow::command

@@ -1,0 +1,21 @@
+// A pack with the least error that fits a budget: one Lagrange multiplier for all bricks of all frames and grids.
+#ifndef BILLOW_COMPILER_PASSES_BUDGET_H
+#define BILLOW_COMPILER_PASSES_BUDGET_H
+
+#include <memory>
+#include <string>
+
+#include "passes/write_pass.h"
+
+namespace billow::compiler {
+
+// Errors of different grids are compared by the squares of their ranges over the whole sequence, every voxel alike. A
+// first pass surveys what each grid frame takes at each multiplier; the multiplier at which the sum fits writes the
+// pack; what the pack takes corrects the sum, and once more, until it fits and little is left (a few passes).
+// Returns the pass that fits, not committed. Throws Error(input), naming the least that is possible, when none does.
+std::unique_ptr<WritePass> fitBudget(const std::string& output, const CompileOptions& options, const Plan& plan,
+                                     const Warn& warn);
+
+}  // namespace billow::compiler
+
+#endif  // BILLOW_COMPILER_PASSES_BUDGET_H

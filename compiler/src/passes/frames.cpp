@@ -1,0 +1,118 @@
+#include "passes/frames.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_pipeline.h>
+#include <xxhash.h>
+
+#include <unordered_set>
+
+namespace billow::compiler {
+namespace {
+
+// Frames in the pipeline at once: one on its way in, one being tried, while another is consumed.
+constexpr std::size_t kFramesInFlight = 2;
+
+static_assert(sizeof(Tile) == 20, "Tile has no padding that a hash would meet");
+
+using FramePtr = std::shared_ptr<FrameWork>;
+
+std::uint64_t contentOf(const ImportedGrid& grid, const std::vector<LeafKey>& keys) {
+  std::uint64_t hash = XXH3_64bits_withSeed(&grid.background, sizeof(grid.background), keys.size());
+  for (const LeafKey& key : keys) {
+    hash = XXH3_64bits_withSeed(key.origin.data(), sizeof(key.origin), hash);
+    hash = XXH3_64bits_withSeed(&key.hash, sizeof(key.hash), hash);
+  }
+  return XXH3_64bits_withSeed(grid.tiles.data(), grid.tiles.size() * sizeof(Tile), hash);
+}
+
+class Pipeline {
+ public:
+  explicit Pipeline(const FrameRun& run) : run_(run) {
+    for (std::size_t v = 0; v < run.plan.volumes.size(); ++v) {
+      for (std::size_t f = 0; f < run.plan.volumes[v].frames.size(); ++f) jobs_.push_back({v, f});
+    }
+  }
+
+  void run() {
+    constexpr auto kInOrder = tbb::filter_mode::serial_in_order;
+    constexpr auto kParallel = tbb::filter_mode::parallel;
+    std::size_t next = 0;
+    tbb::parallel_pipeline(
+        kFramesInFlight,
+        tbb::make_filter<void, Job>(kInOrder,
+                                    [&](tbb::flow_control& control) {
+                                      if (next == jobs_.size()) control.stop();
+                                      return next == jobs_.size() ? Job{} : jobs_[next++];
+                                    }) &
+            tbb::make_filter<Job, FramePtr>(kParallel, [this](const Job& job) { return import(job); }) &
+            tbb::make_filter<FramePtr, FramePtr>(kInOrder, [this](const FramePtr& frame) { return match(frame); }) &
+            tbb::make_filter<FramePtr, FramePtr>(kParallel, [this](const FramePtr& frame) { return tryGrids(frame); }) &
+            tbb::make_filter<FramePtr, void>(kInOrder, [this](const FramePtr& frame) { run_.consume(*frame); }));
+  }
+
+ private:
+  FramePtr import(const Job& job) const {
+    auto frame = std::make_shared<FrameWork>();
+    frame->job = job;
+    const PlannedVolume& volume = run_.plan.volumes[job.volume];
+    frame->held = (volume.frames[job.frame].flags & format::kFrameHeld) != 0;
+    if (frame->held) return frame;
+    frame->imported = importFrame(volume, volume.frames[job.frame], run_.import, run_.warn);
+    for (const ImportedGrid& grid : frame->imported.grids) {
+      GridWork& work = frame->grids.emplace_back();
+      work.keys = leafKeys(grid);
+      work.content = contentOf(grid, work.keys);
+    }
+    return frame;
+  }
+
+  // Cheap, so it may be serial: then what is tried does not depend on how far other frames are.
+  FramePtr match(const FramePtr& frame) {
+    if (frame->job.frame == 0) before_.assign(frame->grids.size(), {});
+    for (std::size_t g = 0; g < frame->grids.size(); ++g) {
+      GridWork& work = frame->grids[g];
+      work.isNew = frame->imported.grids[g].present && contents_.insert(work.content).second;
+      if (!work.isNew) continue;
+      work.unchanged = unchangedLeaves(before_[g], work.keys);
+      before_[g] = work.keys;
+    }
+    return frame;
+  }
+
+  FramePtr tryGrids(const FramePtr& frame) const {
+    for (std::size_t g = 0; g < frame->grids.size(); ++g) {
+      GridWork& work = frame->grids[g];
+      const ImportedGrid& grid = frame->imported.grids[g];
+      if (!work.isNew || grid.leaves.empty()) continue;
+      work.goal = run_.goal(frame->job, g, grid);
+      work.trials = std::make_unique<GridTrials>(grid, *work.goal, run_.effort, work.unchanged);
+    }
+    return frame;
+  }
+
+  const FrameRun& run_;
+  std::vector<Job> jobs_;
+  std::unordered_set<std::uint64_t> contents_;  // of every grid frame so far
+  std::vector<std::vector<LeafKey>> before_;    // by grid of the volume: the last new content
+};
+
+}  // namespace
+
+void runFrames(const FrameRun& run) {
+  Pipeline(run).run();
+}
+
+std::string whereIs(const Plan& plan, const Job& job, std::size_t grid) {
+  const PlannedVolume& volume = plan.volumes[job.volume];
+  const PlannedFrame& frame = volume.frames[job.frame];
+  return fmt::format("{}: frame {}: grid '{}'", frame.files.empty() ? volume.name : frame.files.front(), frame.number,
+                     volume.grids[grid].name);
+}
+
+std::size_t frameCount(const Plan& plan) {
+  std::size_t count = 0;
+  for (const PlannedVolume& volume : plan.volumes) count += volume.frames.size();
+  return count;
+}
+
+}  // namespace billow::compiler

@@ -1,0 +1,162 @@
+#include "passes/write_pass.h"
+
+#include <algorithm>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "billow/format/gpu_size.h"
+#include "billow/format/psnr.h"
+#include "choose/decide.h"
+
+namespace billow::compiler {
+namespace {
+
+std::string settingsJson(const CompileOptions& options) {
+  nlohmann::ordered_json info;
+  info["generator"] = "billow " BILLOW_VERSION;
+  info["compression"] = options.compression == format::Compression::small ? "small" : "fast";
+  auto& quality = info["quality"];
+  quality["effort"] = options.quality.effort;
+  if (options.quality.psnr && !options.budget.any()) quality["psnr"] = *options.quality.psnr;
+  if (options.quality.metric == Metric::depth) quality["metric"] = "depth";
+  if (options.quality.maxError) quality["maxError"] = static_cast<double>(*options.quality.maxError);
+  if (options.budget.gpu) quality["gpuBudget"] = *options.budget.gpu;
+  if (options.budget.disk) quality["diskBudget"] = *options.budget.disk;
+  return info.dump(2) + "\n";
+}
+
+format::PackWriter::Options writerOptions(const CompileOptions& options) {
+  format::PackWriter::Options result;
+  result.compression = options.compression;
+  result.threads = options.threads;
+  return result;
+}
+
+format::GridFrame absent() {
+  format::GridFrame record{};
+  record.node5 = format::kNone;
+  for (int a = 0; a < 3; ++a) {
+    record.activeMax[a] = -1;
+    record.indexToWorld[5 * a] = 1;
+  }
+  return record;
+}
+
+}  // namespace
+
+WritePass::WritePass(const std::string& output, const CompileOptions& options, const Plan& plan)
+    : options_(options), plan_(plan), writer_(output, writerOptions(options)), sharer_(writer_) {
+  for (const PlannedVolume& volume : plan.volumes) addVolume(volume);
+}
+
+void WritePass::addVolume(const PlannedVolume& volume) {
+  format::VolumeRecord record{};
+  record.name = tables_.addString(volume.name);
+  record.firstGrid = static_cast<std::uint32_t>(tables_.grids.size());
+  record.gridCount = static_cast<std::uint32_t>(volume.grids.size());
+  record.firstFrame = static_cast<std::uint32_t>(tables_.frames.size());
+  record.frameCount = static_cast<std::uint32_t>(volume.frames.size());
+  record.firstGridFrame = gridFrames_;
+  record.framesPerSecond = static_cast<float>(volume.framesPerSecond);
+  record.look = volume.look;
+  gridFrames_ += record.gridCount * record.frameCount;
+  for (const PlannedGrid& grid : volume.grids) {
+    format::GridRecord gridRecord{};
+    gridRecord.name = tables_.addString(grid.name);
+    gridRecord.role = static_cast<std::uint32_t>(grid.role);
+    gridRecord.sourceType = static_cast<std::uint32_t>(grid.sourceType);
+    gridRecord.component = grid.component;
+    gridRecord.volume = static_cast<std::uint32_t>(tables_.volumes.size());
+    tables_.grids.push_back(gridRecord);
+    GridReport gridReport;
+    gridReport.volume = volume.name;
+    gridReport.grid = grid.name;
+    gridReport.worstPsnr = std::numeric_limits<double>::infinity();
+    report_.grids.push_back(gridReport);
+  }
+  for (const PlannedFrame& frame : volume.frames) {
+    const double time = (frame.number - volume.frames.front().number) / volume.framesPerSecond;
+    tables_.frames.push_back({frame.number, frame.flags, time});
+  }
+  tables_.volumes.push_back(record);
+}
+
+void WritePass::run(const GoalFunction& goal, const Warn& warn) {
+  report_.frames = frameCount(plan_);
+  if (options_.progress) options_.progress(0, report_.frames);
+  runFrames(
+      {plan_, options_.import, options_.quality.effort, warn, goal, [this](const FrameWork& frame) { write(frame); }});
+  tables_.infoJson = settingsJson(options_);
+  report_.gpuBytes = format::packGpuBytes(tables_.gridFrames, writer_.itemCounts());
+  report_.fileBytes = writer_.close(tables_);
+}
+
+void WritePass::write(const FrameWork& frame) {
+  const std::size_t grids = plan_.volumes[frame.job.volume].grids.size();
+  const std::uint32_t firstReport = tables_.volumes[frame.job.volume].firstGrid;
+  if (frame.job.frame == 0) before_.assign(grids, {});
+  for (std::size_t g = 0; g < grids; ++g) {
+    tables_.gridFrames.push_back(frame.held ? tables_.gridFrames[tables_.gridFrames.size() - grids]
+                                            : addGridFrame(frame, g));
+    if (!frame.held) tally(frame, g, report_.grids[firstReport + g]);
+  }
+  ++done_;
+  if (options_.progress) options_.progress(done_, report_.frames);
+}
+
+format::GridFrame WritePass::addGridFrame(const FrameWork& frame, std::size_t g) {
+  const ImportedGrid& imported = frame.imported.grids[g];
+  if (!imported.present) return absent();
+  if (frame.grids[g].isNew) return addNew(frame, g);
+  // The same tree and pages under this frame's transform.
+  format::GridFrame record = written_.at(frame.grids[g].content).record;
+  placeOrigin(imported.indexToWorld, record);
+  return record;
+}
+
+format::GridFrame WritePass::addNew(const FrameWork& frame, std::size_t g) {
+  const ImportedGrid& imported = frame.imported.grids[g];
+  const GridWork& work = frame.grids[g];
+  const std::string where = whereIs(plan_, frame.job, g);
+  ChosenGrid chosen;
+  if (work.trials) chosen = decide(imported, *work.goal, *work.trials, before_[g], work.unchanged, where);
+  std::vector<std::uint32_t> pages;
+  format::GridFrame record = sharer_.addGrid(imported, chosen, where, pages);
+  record.flags = format::kGridPresent;
+  record.pageListBegin = static_cast<std::uint32_t>(tables_.pageLists.size());
+  record.pageListCount = static_cast<std::uint32_t>(pages.size());
+  tables_.pageLists.insert(tables_.pageLists.end(), pages.begin(), pages.end());
+  Written& entry = written_[work.content];
+  entry.record = record;
+  for (std::size_t i = 0; i < chosen.bricks.size(); ++i) {
+    const ChosenBrick& brick = chosen.bricks[i];
+    EncodingTally& tally = entry.encodings[brick.encoding];
+    ++tally.bricks;
+    tally.reused += brick.reused ? 1 : 0;
+    tally.bytes += brick.reused ? 0 : brick.payload.size();
+    tally.squaredError += brick.squaredError;
+    tally.activeVoxels += work.trials->activeVoxels(i);
+  }
+  before_[g].keep(imported, std::move(chosen));
+  return record;
+}
+
+void WritePass::tally(const FrameWork& frame, std::size_t g, GridReport& report) const {
+  const format::GridFrame& record = tables_.gridFrames.back();
+  if ((record.flags & format::kGridPresent) == 0) return;
+  ++report.frames;
+  report.activeVoxels += record.activeVoxels;
+  const auto& encodings = written_.at(frame.grids[g].content).encodings;
+  for (std::size_t e = 0; e < encodings.size(); ++e) {
+    report.encodings[e].bricks += encodings[e].bricks;
+    report.encodings[e].reused += frame.grids[g].isNew ? encodings[e].reused : encodings[e].bricks;
+    report.encodings[e].bytes += frame.grids[g].isNew ? encodings[e].bytes : 0;
+    report.encodings[e].squaredError += encodings[e].squaredError;
+    report.encodings[e].activeVoxels += encodings[e].activeVoxels;
+  }
+  report.worstPsnr = std::min(report.worstPsnr, format::psnr(record));
+  report.maxError = std::max(report.maxError, record.maxError);
+  report.largestFrameGpuBytes = std::max(report.largestFrameGpuBytes, format::gpuBytes(record).total());
+}
+
+}  // namespace billow::compiler
