@@ -148,13 +148,17 @@ void encodeBc7(const BrickSource& brick, std::uint32_t encoding, int effort, Can
 void encodeBc7BestAxis(const BrickSource& brick, int effort, Candidate& out);
 // Of `bits` 1 to 8, or 16.
 void encodeUniform(const BrickSource& brick, std::uint32_t bits, Candidate& out);
-// What encodeUniform() will do with 1 to 8 bits, all at once; fits[i] has i + 1.
-void fitUniforms(const BrickSource& brick, std::array<Fit, 8>& fits);
+// What encodeUniform() will do with `first` to `last` bits of 1 to 8, all at once; fits[i] has i + 1.
+void fitUniforms(const BrickSource& brick, std::uint32_t first, std::uint32_t last, std::array<Fit, 8>& fits);
+// The squared errors that uniform bricks of 1 to 8 bits would have if values filled the brick's range evenly.
+std::array<double, 8> estimateUniforms(const BrickSource& brick);
 // Of `bits` 2 to 6.
 void encodeLocal(const BrickSource& brick, std::uint32_t bits, Candidate& out);
 // The squared errors that local bricks of 2 to 6 bits would have if values filled their cells' ranges evenly.
 std::array<double, 5> estimateLocals(const BrickSource& brick);
 void encodeCoarse(const BrickSource& brick, Candidate& out);
+// The squared error that a coarse brick would leave if what bends along z were noise.
+double estimateCoarse(const BrickSource& brick);
 
 }  // namespace billow::compiler
 

@@ -36,13 +36,13 @@ void decodeBc7(std::uint32_t encoding, const std::byte* bytes, Texels& texels) {
 }
 
 void unpackIndices(const std::byte* bytes, std::uint32_t bits, Texels& indices) {
-  const std::uint32_t last = (1u << bits) - 1;
-  std::uint32_t pending = 0, held = 0;
-  for (std::uint16_t& index : indices) {
-    for (; held < bits; held += 8) pending |= std::to_integer<std::uint32_t>(*bytes++) << held;
-    index = static_cast<std::uint16_t>(pending & last);
-    pending >>= bits;
-    held -= bits;
+  // Eight indices begin and end at whole bytes, and fit one word; four do where they have 16 bits.
+  const std::uint32_t step = bits == 16 ? 4 : 8;
+  const std::uint64_t last = (1u << bits) - 1;
+  for (std::uint32_t i = 0; i < kBrickVoxels; i += step, bytes += step * bits / 8) {
+    std::uint64_t word = 0;
+    for (std::uint32_t b = 0; b < step * bits / 8; ++b) word |= std::to_integer<std::uint64_t>(bytes[b]) << (8 * b);
+    for (std::uint32_t k = 0; k < step; ++k) indices[i + k] = static_cast<std::uint16_t>(word >> (k * bits) & last);
   }
 }
 
@@ -158,10 +158,11 @@ std::uint32_t decodeIndex(std::uint32_t encoding, std::span<const std::byte> byt
 }
 
 void packIndices(const Texels& indices, std::uint32_t bits, std::byte* bytes) {
-  std::uint32_t pending = 0, held = 0;
-  for (const std::uint16_t index : indices) {
-    pending |= static_cast<std::uint32_t>(index) << held;
-    for (held += bits; held >= 8; held -= 8, pending >>= 8) *bytes++ = static_cast<std::byte>(pending & 0xff);
+  const std::uint32_t step = bits == 16 ? 4 : 8;
+  for (std::uint32_t i = 0; i < kBrickVoxels; i += step) {
+    std::uint64_t word = 0;
+    for (std::uint32_t k = 0; k < step; ++k) word |= std::uint64_t{indices[i + k]} << (k * bits);
+    for (std::uint32_t b = 0; b < step * bits / 8; ++b) *bytes++ = static_cast<std::byte>(word >> (8 * b) & 0xff);
   }
 }
 

@@ -54,7 +54,7 @@ void registerAll(const Corpus& corpus) {
   }
   add("uniform1to8", [](const auto& brick, compiler::Candidate& out) {
     std::array<compiler::Fit, 8> fits;
-    compiler::fitUniforms(brick, fits);
+    compiler::fitUniforms(brick, 1, 8, fits);
     out.squaredError = fits[7].squaredError;
   });
   for (const std::uint32_t bits : {2u, 4u, 8u, 16u}) {

@@ -201,7 +201,7 @@ TEST(Encode, uniformTexelsAreWithinHalfAStep) {
 TEST(Encode, fitsOfUniformBricksAreThoseOfTheirEncoders) {
   for (const NamedBrick& named : corpus()) {
     std::array<compiler::Fit, 8> fits;
-    compiler::fitUniforms(sourceOf(named.brick), fits);
+    compiler::fitUniforms(sourceOf(named.brick), 1, 8, fits);
     for (std::uint32_t bits = 1; bits <= 8; ++bits) {
       Candidate candidate;
       compiler::encodeUniform(sourceOf(named.brick), bits, candidate);

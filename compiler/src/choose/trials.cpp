@@ -23,6 +23,9 @@ constexpr auto kRecordBytes = static_cast<std::uint32_t>(format::kGpuRecordBytes
 // Constant, uniform 1 to 8, some of local and coarse, BC7 and BC7 again: room for them is made at once.
 constexpr std::size_t kUsualChoices = 14;
 
+// How far the multiplier that guesses give may be off.
+constexpr double kGuessFactor = 6;
+
 constexpr std::uint32_t kBc7Bytes = 128;
 constexpr std::uint32_t kCoarseBytes = 64;
 constexpr std::uint32_t kWideBytes = 1024;
@@ -87,12 +90,15 @@ void GridTrials::settleQuietBricks() {
 }
 
 void GridTrials::tryUniform() {
-  forEachTried([this](std::size_t i, Candidate& candidate) {
+  guesses_.resize(bricks_.size());
+  forEachTried([this](std::size_t i, Candidate&) { guesses_[i] = estimateUniforms(source(i)); });
+  const auto known = goal_.depth ? std::nullopt : guessedMargin();
+  forEachTried([&](std::size_t i, Candidate& candidate) {
     if (quiet_[i]) return;
+    const auto [first, last] = bitsWorthFitting(i, known);
     std::array<Fit, 8> fits;
-    fitUniforms(source(i), fits);
-    // With one bit that says which voxels are active nothing is left: that is a constant.
-    for (std::uint32_t bits = fits[0].texelMask ? 2 : 1; bits <= fits.size(); ++bits) {
+    fitUniforms(source(i), first, last, fits);
+    for (std::uint32_t bits = first; bits <= last; ++bits) {
       if (goal_.countsDisk || goal_.depth) {
         encodeUniform(source(i), bits, candidate);
         add(i, candidate);
@@ -111,7 +117,7 @@ void GridTrials::tryLocal() {
   const double optimism = kOptimism * (goal_.depth ? DepthGoal::kDistortionOfNoise : 1);
   const auto known = margin();
   forEachTried([&](std::size_t i, Candidate& candidate) {
-    if (quiet_[i]) return;
+    if (quiet_[i] || !mayPay(i, *format::brickBytes(format::kEncodingLocal2), 0, known)) return;
     const std::array<double, 5> guesses = estimateLocals(source(i));
     for (std::uint32_t bits = 2; bits <= 6; ++bits) {
       const std::uint32_t bytes = *format::brickBytes(format::localEncoding(bits));
@@ -123,9 +129,12 @@ void GridTrials::tryLocal() {
 }
 
 void GridTrials::tryCoarse() {
+  constexpr double kOptimism = 0.05;  // of the error if all that bends were noise
   const auto known = margin();
   forEachTried([&](std::size_t i, Candidate& candidate) {
-    if (quiet_[i] || !mayPay(i, kCoarseBytes + maskBytes(i), 0, known)) return;
+    if (quiet_[i]) return;
+    const double hoped = goal_.depth ? 0 : estimateCoarse(source(i)) * kOptimism;
+    if (!mayPay(i, kCoarseBytes + maskBytes(i), hoped, known)) return;
     encodeCoarse(source(i), candidate);
     add(i, candidate);
   });
@@ -133,15 +142,11 @@ void GridTrials::tryCoarse() {
 
 void GridTrials::tryBc7() {
   constexpr double kOptimism = 0.1;  // of the error of uniform bricks with as many bits
+  const double optimism = kOptimism * (goal_.depth ? DepthGoal::kDistortionOfNoise : 1);
   const auto known = margin();
   const int effort = refinesBc7() ? 0 : effort_;
   forEachTried([&](std::size_t i, Candidate& candidate) {
-    if (quiet_[i]) return;
-    const auto& tried = bricks_[i].tried;
-    const auto two = std::find_if(tried.begin(), tried.end(),
-                                  [](const Fit& fit) { return fit.encoding == format::uniformEncoding(2); });
-    const Choice& twoBits = choices_[i][static_cast<std::size_t>(two - tried.begin())];
-    if (!mayPay(i, kBc7Bytes + maskBytes(i), twoBits.squaredError * kOptimism, known)) return;
+    if (quiet_[i] || !mayPay(i, kBc7Bytes + maskBytes(i), guesses_[i][1] * optimism, known)) return;
     encodeBc7BestAxis(source(i), effort, candidate);
     add(i, candidate);
   });
@@ -201,6 +206,48 @@ std::optional<GridTrials::Margin> GridTrials::margin() const {
   const auto mix = allocate(tried, triedBudget(), std::numeric_limits<float>::infinity());
   if (!mix) return std::nullopt;
   return Margin{mix->multiplier, goal_.limit};
+}
+
+// The same where bricks are constant or uniform and as good as guessed.
+std::optional<GridTrials::Margin> GridTrials::guessedMargin() const {
+  if (goal_.exchange || !goal_.hasBudget()) return margin();
+  std::vector<std::vector<Choice>> guessed;
+  for (std::size_t i = 0; i < choices_.size(); ++i) {
+    if (skip_[i]) continue;
+    guessed.push_back(choices_[i]);
+    for (std::uint32_t bits = 1; bits <= 8 && !quiet_[i]; ++bits) {
+      const std::uint32_t bytes = kRecordBytes + *format::brickBytes(format::uniformEncoding(bits));
+      guessed.back().push_back({bytes, guesses_[i][bits - 1], 0});
+    }
+  }
+  const auto mix = allocate(guessed, triedBudget(), std::numeric_limits<float>::infinity());
+  if (!mix) return std::nullopt;
+  return Margin{mix->multiplier, goal_.limit};
+}
+
+// The numbers of bits of a uniform brick, first and last, that may win at the margin: all where that is not known.
+std::pair<std::uint32_t, std::uint32_t> GridTrials::bitsWorthFitting(std::size_t i,
+                                                                     const std::optional<Margin>& known) const {
+  // With one bit that says which voxels are active nothing is left: that is a constant.
+  const std::uint32_t least = counts_[i] == format::kBrickVoxels ? 1 : 2;
+  if (!known) return {least, 8};
+  const auto cheapestBits = [&](double multiplier) {
+    std::uint32_t best = least;
+    const auto cost = [&](std::uint32_t bits) {
+      const std::uint32_t bytes = *format::brickBytes(format::uniformEncoding(bits));
+      return guesses_[i][bits - 1] + multiplier * rate(bytes, bytes / 2);
+    };
+    for (std::uint32_t bits = least + 1; bits <= 8; ++bits) {
+      if (cost(bits) < cost(best)) best = bits;
+    }
+    return best;
+  };
+  const std::uint32_t first = cheapestBits(known->multiplier * kGuessFactor);
+  std::uint32_t last = cheapestBits(known->multiplier / kGuessFactor);
+  // Half a step of evenly spread levels, three times its mean square, must keep the bound on single voxels.
+  const double limit = static_cast<double>(known->limit);
+  while (last < 8 && 3 * guesses_[i][last - 1] / counts_[i] > limit * limit) ++last;
+  return {first, last};
 }
 
 double GridTrials::rate(std::uint32_t bytes, std::uint32_t diskBytes) const {

@@ -2,10 +2,12 @@
 #ifndef BILLOW_COMPILER_CHOOSE_TRIALS_H
 #define BILLOW_COMPILER_CHOOSE_TRIALS_H
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "choose/choose.h"
@@ -63,6 +65,8 @@ class GridTrials {
   void refineBc7();
   double triedBudget() const;
   std::optional<Margin> margin() const;
+  std::optional<Margin> guessedMargin() const;
+  std::pair<std::uint32_t, std::uint32_t> bitsWorthFitting(std::size_t brick, const std::optional<Margin>& known) const;
   double rate(std::uint32_t bytes, std::uint32_t diskBytes) const;
   bool mayPay(std::size_t brick, std::uint32_t bytes, double squaredError, const std::optional<Margin>& margin) const;
   BrickSource source(std::size_t brick) const;
@@ -80,6 +84,7 @@ class GridTrials {
   std::vector<std::vector<Choice>> choices_;
   std::vector<std::uint32_t> counts_;
   std::vector<char> skip_, quiet_;
+  std::vector<std::array<double, 8>> guesses_;  // of the squared errors of uniform bricks of 1 to 8 bits
   bool triedWide_ = false;
 };
 

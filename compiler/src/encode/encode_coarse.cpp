@@ -106,6 +106,24 @@ void fitPoints(const BrickSource& brick, const TexelTargets& targets, Points& po
 
 }  // namespace
 
+double estimateCoarse(const BrickSource& brick) {
+  TexelWeights weights;
+  texelWeights(brick, weights);
+  double squares = 0, count = 0;
+  for (std::uint32_t row = 0; row < format::kBrickVoxels; row += 8) {
+    const float* v = brick.values->data() + row;
+    const float* w = weights.data() + row;
+    for (std::uint32_t z = 1; z < 7; ++z) {
+      const double counts = static_cast<double>(w[z - 1] * w[z] * w[z + 1]);
+      const double bend = static_cast<double>(v[z - 1]) - 2 * static_cast<double>(v[z]) + static_cast<double>(v[z + 1]);
+      squares += counts * bend * bend;
+      count += counts;
+    }
+  }
+  // White noise of variance s^2 bends by 6 s^2 in the square; a point for eight voxels takes an eighth of it away.
+  return count > 0 ? squares / count / 6 * 7 / 8 * brick.activeCount : 0;
+}
+
 void encodeCoarse(const BrickSource& brick, Candidate& out) {
   const ValueRange values = activeRange(brick);
   const TexelRange texels255 = coverRange(values, 0, 255);

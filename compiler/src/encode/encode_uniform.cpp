@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 
+#include "encode/brick_lanes.h"
 #include "encode/uniform_lanes.h"
 
 namespace billow::compiler {
@@ -80,10 +81,21 @@ void fitUniform(const BrickSource& brick, const ActiveValues& active, std::uint3
 
 }  // namespace
 
-void fitUniforms(const BrickSource& brick, std::array<Fit, 8>& fits) {
+void fitUniforms(const BrickSource& brick, std::uint32_t first, std::uint32_t last, std::array<Fit, 8>& fits) {
   const ActiveValues active(brick);
   alignas(32) float indices[format::kBrickVoxels];
-  for (std::uint32_t bits = 1; bits <= 8; ++bits) fitUniform(brick, active, bits, indices, fits[bits - 1]);
+  for (std::uint32_t bits = first; bits <= last; ++bits) fitUniform(brick, active, bits, indices, fits[bits - 1]);
+}
+
+std::array<double, 8> estimateUniforms(const BrickSource& brick) {
+  const ValueRange range = activeRange(brick);
+  const double width = static_cast<double>(range.max) - static_cast<double>(range.min);
+  std::array<double, 8> errors;
+  for (std::uint32_t bits = 1; bits <= 8; ++bits) {
+    const double levels = (1u << bits) - firstIndex(brick);
+    errors[bits - 1] = brick.activeCount * width * width / (12 * levels * levels);
+  }
+  return errors;
 }
 
 void encodeUniform(const BrickSource& brick, std::uint32_t bits, Candidate& out) {

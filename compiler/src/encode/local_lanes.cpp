@@ -1,5 +1,7 @@
 #include "encode/local_lanes.h"
 
+#include <algorithm>
+
 #include "encode/brick_lanes.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -175,8 +177,12 @@ void fillCells(const BrickSource& brick, ValueRange range, Cells& cells) {
     numbers[i] = static_cast<float>(place > 0 ? (place < 1 ? place : 1) : 0);
   }
   byCells(numbers.data(), cells.place);
-  texelWeights(brick, numbers);
-  byCells(numbers.data(), cells.weight);
+  if (brick.activeCount == format::kBrickVoxels) {
+    std::fill_n(&cells.weight[0][0][0], format::kBrickVoxels, 1.0f);
+  } else {
+    texelWeights(brick, numbers);
+    byCells(numbers.data(), cells.weight);
+  }
   HWY_DYNAMIC_DISPATCH(rangeOfCells)(cells);
 }
 
