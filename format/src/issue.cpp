@@ -120,12 +120,14 @@ constexpr IssueKind kCatalogue[] = {
 
     error(Rule::brickEncoding, "brick-encoding", "A brick's encoding is known."),
     error(Rule::brickUnits, "brick-units", "A brick's units exist and lie in one page; a constant has unit 0."),
-    error(Rule::brickMask, "brick-mask", "A brick's mask exists, and comes from its indices only where the encoding has indices."),
+    error(Rule::brickMask, "brick-mask",
+          "A brick's mask exists, and comes from its indices only where the encoding has indices."),
     error(Rule::brickFinite, "brick-finite", "A brick's values are finite, the largest that it can hold included."),
     error(Rule::brickScale, "brick-scale", "A brick's scale is not negative, and a constant's is zero."),
     error(Rule::brickMean, "brick-mean",
           "A brick's mean lies between the least and the largest that it can hold, or the background."),
-    error(Rule::brickOverlap, "brick-overlap", "Two bricks have no unit in common, or all and then the same encoding or both BC7."),
+    error(Rule::brickOverlap, "brick-overlap",
+          "Two bricks have no unit in common, or all and then the same encoding or both BC7."),
 
     error(Rule::counts, "counts", "A grid frame's counts are those of what it reaches."),
     error(Rule::activeVoxels, "active-voxels", "A grid frame's active voxels are those that it reaches."),

@@ -105,10 +105,10 @@ TEST(InfoCommand, TellsGridsFramesAndBytes) {
   EXPECT_EQ(volume["frames"][1]["frame"], 8);
   ASSERT_EQ(volume["grids"].size(), 2u);
   const auto& frame = volume["grids"][0]["frames"][0];
-  EXPECT_EQ(frame["bricks"], 5);
-  EXPECT_EQ(frame["gpuBytes"]["r16"], 1024);
+  EXPECT_EQ(frame["bricks"], 7);
+  EXPECT_EQ(frame["gpuBytes"]["uniform"], 192 + 1024 + 512);
   EXPECT_EQ(frame["gpuBytes"]["masks"], 128);
-  EXPECT_EQ(frame["gpuBytes"]["records"], (5 + 1) * 16);  // of bricks, and of the tile
+  EXPECT_EQ(frame["gpuBytes"]["records"], (7 + 1) * 16);  // of bricks, and of the tile
   EXPECT_EQ(frame["psnr"], nullptr);
   EXPECT_EQ(volume["grids"][1]["frames"][0]["present"], false);
 }

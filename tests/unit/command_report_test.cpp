@@ -160,7 +160,7 @@ TEST_F(Report, TheMixIsNoDearerThanAnyEncodingAlone) {
   EXPECT_GE(reached, 3u);
   EXPECT_EQ(bits.at("constant"), "out of reach");
   // The compiler's choice is this very mix, but for its limit on single voxels and what is shared.
-  EXPECT_NEAR(std::stod(bits.at("pack").get<std::string>()), mix, 0.1 * mix);
+  EXPECT_NEAR(std::stod(bits.at("pack").get<std::string>()), mix, 0.15 * mix);
 }
 
 TEST_F(Report, CountsTheBytesThatInfoCounts) {

@@ -109,10 +109,17 @@ void GridTrials::tryUniform() {
   });
 }
 
+// Local bricks save about 2 % on the GPU and cost 8 % on disk, where uniform ones are coded better. So they are tried
+// only where the GPU's bytes alone are asked about.
+bool GridTrials::triesLocal() const {
+  return goal_.exchange && !goal_.countsDisk;
+}
+
 // The others are dear to try, so they are left out where they cannot pay: the mix so far has a Lagrange multiplier at
 // the error asked, and a brick is passed over where even an optimistic guess of the new encoding's error loses against
 // the brick's other choices at that multiplier, halved and doubled (the final one differs a little).
 void GridTrials::tryLocal() {
+  if (!triesLocal()) return;
   constexpr double kOptimism = 0.5;  // of the error of values that fill their cells' ranges evenly
   const double optimism = kOptimism * (goal_.depth ? DepthGoal::kDistortionOfNoise : 1);
   const auto known = margin();
@@ -129,7 +136,7 @@ void GridTrials::tryLocal() {
 }
 
 void GridTrials::tryCoarse() {
-  constexpr double kOptimism = 0.05;  // of the error if all that bends were noise
+  constexpr double kOptimism = 0.15;  // of the error if all that bends were noise
   const auto known = margin();
   forEachTried([&](std::size_t i, Candidate& candidate) {
     if (quiet_[i]) return;

@@ -58,6 +58,7 @@ class GridTrials {
   void tryConstants();
   void settleQuietBricks();
   void tryUniform();
+  bool triesLocal() const;
   void tryLocal();
   void tryCoarse();
   void tryBc7();
