@@ -136,7 +136,7 @@ struct BrickSource {
   const format::Values* values;
   const format::Mask3* active;
   std::uint32_t activeCount;
-  float tile;  // what inactive voxels must become
+  float tile;  // the background: what inactive voxels become
 };
 
 // Each fills `out` whole (payload only as far as it is used).

@@ -19,8 +19,8 @@ class ShareTest : public testing::Test {
   ShareTest() : path_(testing::TempDir() + "share_" + std::to_string(getpid()) + ".blw") {}
   ~ShareTest() override { std::filesystem::remove(path_); }
 
-  // One volume with one grid; each element of `grids` is a frame.
-  void writePack(const std::vector<ImportedGrid>& grids) {
+  // One volume with one grid; each element of `grids` is a frame. `given`: its bricks, if they are not to be chosen.
+  void writePack(const std::vector<ImportedGrid>& grids, const std::vector<ChosenGrid>& given = {}) {
     format::PackWriter writer(path_, {});
     Sharer sharer(writer);
     format::PackTables tables;
@@ -33,7 +33,8 @@ class ShareTest : public testing::Test {
       tables.frames.push_back({static_cast<std::int32_t>(f), 0, static_cast<double>(f) / 24});
       Quality quality;
       quality.psnr = 60;
-      const auto chosen = chooseEncodings({&grids[f], 1}, quality, [](std::size_t) { return kWhere; });
+      const auto chosen = !given.empty() ? std::vector{given[f]}
+                                         : chooseEncodings({&grids[f], 1}, quality, [](std::size_t) { return kWhere; });
       std::vector<std::uint32_t> pages;
       format::GridFrame frame = sharer.addGrid(grids[f], chosen[0], kWhere, pages);
       frame.flags = format::kGridPresent;
@@ -153,6 +154,25 @@ TEST_F(ShareTest, EqualFramesCostNothing) {
   const format::Pack pack = open();
   EXPECT_LT(pack.fileSize(), one + 3 * 512);
   EXPECT_EQ(pack.gridFrames()[0].node5, pack.gridFrames()[3].node5);
+}
+
+// 64 zero bytes are a uniform brick of one bit as well as a coarse one.
+TEST_F(ShareTest, EqualBytesOfDifferentEncodingsAreTwoBricks) {
+  ImportedGrid grid = emptyGrid();
+  ChosenGrid chosen;
+  for (const std::uint32_t encoding : {format::uniformEncoding(1), format::kEncodingCoarse, format::kEncodingCoarse}) {
+    Leaf leaf{};
+    leaf.origin = {8 * static_cast<std::int32_t>(grid.leaves.size()), 0, 0};
+    std::fill(std::begin(leaf.active.words), std::end(leaf.active.words), ~0u);
+    grid.leaves.push_back(leaf);
+    grid.activeVoxels += format::kBrickVoxels;
+    chosen.bricks.push_back({encoding, false, 1, 1, std::vector<std::byte>(64)});
+  }
+  writePack({grid}, {chosen});
+  const format::Pack pack = open();
+  EXPECT_TRUE(format::GridView::load(pack, pack.gridFrames()[0]).has_value());
+  EXPECT_EQ(pack.gridFrames()[0].brickCount[static_cast<std::size_t>(format::BrickClass::uniform)], 1u);
+  EXPECT_EQ(pack.gridFrames()[0].brickCount[static_cast<std::size_t>(format::BrickClass::coarse)], 1u);
 }
 
 TEST_F(ShareTest, AnEmptyGridIsSound) {

@@ -1,8 +1,7 @@
 #include "choose/depth_goal.h"
 
-#include <cmath>
-
 #include "billow/format/brick.h"
+#include "choose/decibels.h"
 #include "metric/depth_distortion.h"
 #include "metric/depth_error.h"
 #include "parallel.h"
@@ -13,8 +12,8 @@ namespace {
 // Of a grid's range. A tighter one costs bytes and a looser one pictures (spec/rationale.md).
 constexpr double kVoxelLimit = 0.05;
 
-// In dB: asked for beyond the shortfall, so that the next measure is likely the last.
-constexpr double kStep = 0.02;
+// Asked for beyond the shortfall (0.02 dB), so that the next measure is likely the last.
+constexpr double kStep = 0.9977;
 
 // `brick` is a ChosenBrick or a Candidate, with a payload of its encoding's size at least.
 template <class Brick>
@@ -31,9 +30,9 @@ void decode(const Brick& brick, const format::Mask3& active, float background, f
 
 }  // namespace
 
-DepthGoal::DepthGoal(const ImportedGrid& grid, double psnr) : grid_(grid), psnr_(psnr) {
+DepthGoal::DepthGoal(const ImportedGrid& grid, double psnr) : grid_(grid) {
   const DepthError source = measureDepth(grid, grid);
-  rmse_ = source.range() / std::pow(10.0, psnr / 20);
+  rmse_ = asked_ = source.range() / amplitudeRatio(psnr);
   lines_ = static_cast<double>(source.lines);
 }
 
@@ -52,9 +51,9 @@ bool DepthGoal::holds(std::span<const ChosenBrick> bricks) {
       decode(bricks[i], grid_.leaves[i].active, grid_.background, result.leaves[i].values);
     }
   });
-  const double reached = measureDepth(grid_, result).psnr();
-  if (reached >= psnr_) return true;
-  rmse_ *= std::pow(10.0, (reached - psnr_ - kStep) / 20);
+  const double reached = measureDepth(grid_, result).rmse();
+  if (reached <= asked_) return true;
+  rmse_ *= asked_ / reached * kStep;
   return false;
 }
 

@@ -30,8 +30,8 @@ class DepthGoal {
 
  private:
   const ImportedGrid& grid_;
-  double psnr_;
-  double rmse_;  // of line integrals, that the allocator is asked for
+  double asked_;  // rmse of line integrals that the PSNR means
+  double rmse_;   // of line integrals, that the allocator is asked for
   double lines_;
 };
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "choose/decibels.h"
+
 namespace billow::compiler {
 namespace {
 
@@ -30,7 +32,7 @@ Goal goalOf(const ImportedGrid& grid, const Quality& quality) {
     goal.depth = std::make_shared<DepthGoal>(grid, *quality.psnr);
     goal.limit = goal.hardLimit = std::min(goal.limit, goal.depth->limit());
   } else if (quality.psnr) {
-    goal.rmse = (static_cast<double>(grid.max) - static_cast<double>(grid.min)) / std::pow(10.0, *quality.psnr / 20.0);
+    goal.rmse = (static_cast<double>(grid.max) - static_cast<double>(grid.min)) / amplitudeRatio(*quality.psnr);
     goal.limit = std::min(goal.limit, static_cast<float>(kOutlierLimit * *goal.rmse));
     goal.hardLimit = goal.limit;
   }
@@ -41,6 +43,7 @@ Goal goalAt(const Exchange& exchange, const Quality& quality) {
   Goal goal;
   goal.exchange = exchange;
   goal.countsDisk = exchange.weights.disk > 0;
+  goal.gpuAlone = !goal.countsDisk;
   if (quality.maxError) goal.hardLimit = *quality.maxError;
   const double rmse =
       std::sqrt(exchange.multiplier * (exchange.weights.gpu + exchange.weights.disk) / kErrorsPerMultiplier);

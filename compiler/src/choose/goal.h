@@ -20,6 +20,7 @@ struct Goal {
   float hardLimit = std::numeric_limits<float>::infinity();  // largest error of a voxel that the user allows
   float limit = std::numeric_limits<float>::infinity();      // the same or less: no voxel goes far astray
   bool countsDisk = false;                                   // bytes on disk are estimated, which takes time
+  bool gpuAlone = false;                                     // the GPU's bytes are all that counts
 
   bool hasBudget() const { return rmse || depth; }
   // Squared error (with depth: distortion) that `voxels` of the grid's `all` in leaves may have together; infinite

@@ -58,7 +58,6 @@ class GridTrials {
   void tryConstants();
   void settleQuietBricks();
   void tryUniform();
-  bool triesLocal() const;
   void tryLocal();
   void tryCoarse();
   void tryBc7();

@@ -30,8 +30,7 @@ struct BrickTargets {
 };
 
 // A brick on its texel scale with an axis exchanged with z, as [c][i][block]: texel i of a 4x4 block at column block &
-// 1 and row block >> 1 & 1 of slice z = 4 * (block >> 2) + c. So c is a channel of eight BC7 blocks, and each c holds
-// eight BC4 blocks.
+// 1 and row block >> 1 & 1 of slice z = 4 * (block >> 2) + c. So c is a channel of eight BC7 blocks.
 struct BlockTexels {
   alignas(32) float value[4][16][8];   // in [0, 255]
   alignas(32) float weight[4][16][8];  // 0 or 1; unset where allActive

@@ -27,8 +27,9 @@ Survey::Survey(const CompileOptions& options, const Plan& plan, const RateWeight
   const std::size_t total = frameCount(plan);
   std::size_t done = 0;
   if (options.progress) options.progress(done, total);
-  Goal goal;  // no error and no exchange: everything is tried
+  Goal goal;  // no error and no exchange: all is tried that the pass which writes may take
   goal.countsDisk = weights.disk > 0;
+  goal.gpuAlone = !goal.countsDisk;
   const auto everything = [&](const Job&, std::size_t, const ImportedGrid&) { return goal; };
   runFrames({plan, options.import, options.quality.effort, warn, everything, [&](const FrameWork& frame) {
                look(frame, options.quality, weights);

@@ -102,8 +102,8 @@ class TreeBuilder {
     return result;
   }
 
-  std::uint32_t intern(Stream stream, const void* items, std::uint32_t count) {
-    const std::uint32_t index = sharer_.intern(stream, items, count);
+  std::uint32_t intern(Stream stream, const void* items, std::uint32_t count, std::uint32_t meaning = 0) {
+    const std::uint32_t index = sharer_.intern(stream, items, count, meaning);
     growPages(pages_, sharer_.writer_.pageOf(stream, index));
     return index;
   }
@@ -119,13 +119,20 @@ class TreeBuilder {
     }
   }
 
+  // Equal bytes are one brick only where they mean the same; BC7's axes are told by the Node3.
+  std::uint32_t internBrick(const ChosenBrick& brick) {
+    const std::uint32_t meaning = format::isBc7(brick.encoding) ? format::kEncodingBc7Z : brick.encoding;
+    const auto units = static_cast<std::uint32_t>(brick.payload.size() / format::kBrickUnitBytes);
+    return intern(Stream::unit, brick.payload.data(), units, meaning);
+  }
+
   Summary addLeaf(const Leaf& leaf, const ChosenBrick& brick) {
     Node3 node{};
     node.lo = brick.lo;
     node.scale = brick.scale;
     const auto payloadBytes = static_cast<std::uint32_t>(brick.payload.size());
     std::uint32_t unit = 0;
-    if (payloadBytes != 0) unit = intern(Stream::unit, brick.payload.data(), payloadBytes / format::kBrickUnitBytes);
+    if (payloadBytes != 0) unit = internBrick(brick);
     node.brick = brick.encoding << format::kEncodingShift | unit;
     const bool full = std::all_of(std::begin(leaf.active.words), std::end(leaf.active.words),
                                   [](std::uint32_t word) { return word == ~0u; });
@@ -306,14 +313,15 @@ class TreeBuilder {
   std::uint64_t cutTiles_ = 0;
 };
 
-Sharer::Key Sharer::keyOf(Stream stream, const void* bytes, std::size_t size) const {
-  const XXH128_hash_t hash = XXH3_128bits_withSeed(bytes, size, static_cast<XXH64_hash_t>(stream));
+Sharer::Key Sharer::keyOf(Stream stream, const void* bytes, std::size_t size, std::uint32_t meaning) const {
+  const XXH64_hash_t seed = static_cast<XXH64_hash_t>(stream) | static_cast<XXH64_hash_t>(meaning) << 8;
+  const XXH128_hash_t hash = XXH3_128bits_withSeed(bytes, size, seed);
   return {hash.low64, hash.high64};
 }
 
-std::uint32_t Sharer::intern(Stream stream, const void* items, std::uint32_t count) {
+std::uint32_t Sharer::intern(Stream stream, const void* items, std::uint32_t count, std::uint32_t meaning) {
   const std::size_t bytes = std::size_t{count} * format::kStreamItemBytes[static_cast<std::size_t>(stream)];
-  const Key key = keyOf(stream, items, bytes);
+  const Key key = keyOf(stream, items, bytes, meaning);
   const auto [at, isNew] = recent_.try_emplace(key, 0u);
   if (!isNew) return at->second;
   const auto old = older_.find(key);

@@ -46,9 +46,9 @@ class Sharer {
   };
   friend class TreeBuilder;
 
-  Key keyOf(format::Stream stream, const void* bytes, std::size_t size) const;
-  // Index of equal content that is there already, or of the appended items.
-  std::uint32_t intern(format::Stream stream, const void* items, std::uint32_t count);
+  Key keyOf(format::Stream stream, const void* bytes, std::size_t size, std::uint32_t meaning) const;
+  // Index of equal content of the same `meaning` that is there already, or of the appended items.
+  std::uint32_t intern(format::Stream stream, const void* items, std::uint32_t count, std::uint32_t meaning = 0);
 
   format::PackWriter& writer_;
   // Two generations: what has not been met again for a generation is forgotten (and would be stored anew), so that

@@ -1,4 +1,4 @@
-// All of a page, in the order of spec/pagecodec.md: Node3s, masks, bricks, means of Node3s, Node5s, Node4s, children.
+// All of a page, in the order of spec/pagecodec.md: Node3s, masks, Node5s, Node4s, bricks, means of Node3s, children.
 #ifndef BILLOW_FORMAT_SRC_PAGE_CODER_PAGE_MODEL_H
 #define BILLOW_FORMAT_SRC_PAGE_CODER_PAGE_MODEL_H
 

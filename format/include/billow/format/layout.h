@@ -63,7 +63,7 @@ BILLOW_CONST kNone = 0xffffffffu;
 // A brick's header: 8x8x8 voxels. An active voxel's value is lo + scale * texel, in single precision, product rounded
 // before the sum, texel an integer from 0 to the encoding's largest (brick.h); an inactive voxel's is the grid frame's
 // background.
-// Voxel (x, y, z) is bit z & 31 ... of its mask: bit index x * 64 + y * 8 + z, word index >> 5, bit index & 31.
+// Voxel (x, y, z) is bit i = x * 64 + y * 8 + z of its mask: bit i & 31 of word i >> 5.
 struct Node3 {
   BILLOW_U32 brick;
   BILLOW_U32 mask;
