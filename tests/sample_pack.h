@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "billow/format/brick.h"
+#include "billow/format/children.h"
 #include "billow/format/gpu_size.h"
 #include "billow/format/writer.h"
 
@@ -135,11 +136,9 @@ class GridFrameBuilder {
         frame_.activeMax[axis] = std::max(frame_.activeMax[axis], at);
       }
     }
-    const auto bit = [&](std::uint32_t shift, std::uint32_t log2) {
-      const std::uint32_t last = (1u << log2) - 1;
-      return (cell[0] >> shift & last) << 2 * log2 | (cell[1] >> shift & last) << log2 | (cell[2] >> shift & last);
-    };
-    nodes_[bit(4, 5)][bit(0, 4)] = child;
+    const std::array<std::uint32_t, 3> at{cell[0] * 8, cell[1] * 8, cell[2] * 8};
+    nodes_[format::childBit(at, format::kNode5Log2, format::kNode4SpanLog2)]
+          [format::childBit(at, format::kNode4Log2, format::kNode3SpanLog2)] = child;
   }
 
   template <class Node>

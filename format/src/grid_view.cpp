@@ -6,6 +6,7 @@
 #include <functional>
 #include <utility>
 
+#include "billow/format/children.h"
 #include "grid_walk.h"
 #include "guard.h"
 
@@ -19,19 +20,14 @@ constexpr std::uint32_t kTileEntry = 0x80000000u;
 
 // Where a region begins in tree order: bit of its Node4, then bit of its Node3.
 std::uint32_t treeOrder(const std::uint32_t (&origin)[3]) {
-  const auto bits = [&](std::uint32_t shift, std::uint32_t log2) {
-    const std::uint32_t last = (1u << log2) - 1;
-    return (origin[0] >> shift & last) << 2 * log2 | (origin[1] >> shift & last) << log2 | (origin[2] >> shift & last);
-  };
-  return bits(kNode4SpanLog2, kNode5Log2) << 3 * kNode4Log2 | bits(kNode3SpanLog2, kNode4Log2);
+  return childBit(origin, kNode5Log2, kNode4SpanLog2) << 3 * kNode4Log2 | childBit(origin, kNode4Log2, kNode3SpanLog2);
 }
 
-void childOrigin(const std::uint32_t (&parent)[3], std::uint32_t bit, std::uint32_t log2, std::uint32_t spanLog2,
-                 std::uint32_t (&origin)[3]) {
-  const std::uint32_t last = (1u << log2) - 1;
-  origin[0] = parent[0] + ((bit >> 2 * log2) << spanLog2);
-  origin[1] = parent[1] + ((bit >> log2 & last) << spanLog2);
-  origin[2] = parent[2] + ((bit & last) << spanLog2);
+// childOrigin(), from a parent that begins at `parent`.
+void placeChild(const std::uint32_t (&parent)[3], std::uint32_t bit, std::uint32_t log2, std::uint32_t childSpanLog2,
+                std::uint32_t (&origin)[3]) {
+  const std::array<std::uint32_t, 3> offset = childOrigin(bit, log2, childSpanLog2);
+  for (std::size_t axis = 0; axis < 3; ++axis) origin[axis] = parent[axis] + offset[axis];
 }
 
 float valueIn(const GridView::Leaf& leaf, float background, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
@@ -109,7 +105,7 @@ struct GridLoader {
     forEachBit(root.mask, [&](std::uint32_t bit) {
       const auto& node = *item<Node4>(walk, Stream::node4, *next++);
       std::uint32_t origin[3];
-      childOrigin(kZero, bit, kNode5Log2, kNode4SpanLog2, origin);
+      placeChild(kZero, bit, kNode5Log2, kNode4SpanLog2, origin);
       layOutNode4(walk, node, origin);
     });
   }
@@ -123,7 +119,7 @@ struct GridLoader {
       GridView::Leaf leaf{};
       leaf.index = *next++;
       leaf.node = *item<Node3>(walk, Stream::node3, leaf.index);
-      childOrigin(origin, bit, kNode4Log2, kNode3SpanLog2, leaf.origin);
+      placeChild(origin, bit, kNode4Log2, kNode3SpanLog2, leaf.origin);
       walk.findParts(leaf.node, leaf.mask, leaf.brick);
       view.leaves_.push_back(leaf);
     });

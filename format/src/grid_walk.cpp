@@ -7,6 +7,8 @@
 #include <iterator>
 #include <utility>
 
+#include "billow/format/children.h"
+
 namespace billow::format {
 namespace {
 
@@ -33,52 +35,9 @@ const T* as(const std::byte* data) {
   return reinterpret_cast<const T*>(data);
 }
 
-// H of the standard: what the largest texel stands for.
-float largestValue(const Node3& node) {
-  return reconstruct(node.lo, node.scale, largestTexel(encodingOf(node)));
-}
-
-std::array<std::uint16_t, 3> childOrigin(std::uint32_t bit, std::uint32_t log2, std::uint32_t childSpanLog2) {
-  const std::uint32_t last = (1u << log2) - 1;
-  return {static_cast<std::uint16_t>((bit >> 2 * log2) << childSpanLog2),
-          static_cast<std::uint16_t>((bit >> log2 & last) << childSpanLog2),
-          static_cast<std::uint16_t>((bit & last) << childSpanLog2)};
-}
-
 }  // namespace
 
-ItemFinder::ItemFinder(const Pack& pack, std::span<const Page> pages) : pagesUsed_(pages.size()) {
-  for (std::uint32_t p = 0; p < pages.size(); ++p) {
-    const PageRecord& record = pack.pages()[pages[p].number];
-    for (std::uint32_t s = 0; s < kStreamCount; ++s) {
-      const StreamRange& run = record.streams[s];
-      if (run.count == 0) continue;
-      runs_[s].push_back(
-          {run.first, run.count, localCount_[s], p, pages[p].stream(record, static_cast<Stream>(s)).data()});
-      localCount_[s] += run.count;
-    }
-  }
-}
-
-ItemFinder::Found ItemFinder::find(Stream stream, std::uint32_t first, std::uint32_t count) {
-  const auto which = static_cast<std::uint32_t>(stream);
-  const std::vector<Run>& runs = runs_[which];
-  if (runs.empty()) return {};
-  const auto holds = [&](const Run& run) {
-    return first >= run.first && first - run.first < run.count && count <= run.count - (first - run.first);
-  };
-  if (!holds(runs[last_[which]])) {
-    const auto after = std::upper_bound(runs.begin(), runs.end(), first,
-                                        [](std::uint32_t value, const Run& run) { return value < run.first; });
-    if (after == runs.begin() || !holds(*(after - 1))) return {};
-    last_[which] = static_cast<std::size_t>(after - 1 - runs.begin());
-  }
-  const Run& run = runs[last_[which]];
-  pagesUsed_[run.page] = 1;
-  return {run.data + std::size_t{first - run.first} * kStreamItemBytes[which], run.local + (first - run.first)};
-}
-
-void GridWalk::Box::add(const Box& box, const std::array<std::uint16_t, 3>& origin) {
+void GridWalk::Box::add(const Box& box, const std::array<std::uint32_t, 3>& origin) {
   if (box.empty()) return;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     low[axis] = std::min(low[axis], static_cast<std::uint16_t>(origin[axis] + box.low[axis]));
@@ -257,13 +216,13 @@ bool GridWalk::visitNode3(const Node3& node, std::uint32_t index, BrickFacts& fa
   } else if (node.mask == kMaskAll) {
     facts.active = kBrickVoxels;
     facts.high.fill(7);
-    boundLoosely(node, facts);
+    facts.boundValues(node, frame_.background);
   } else {
     const ItemFinder::Found found = finder_.find(Stream::mask, node.mask, 1);
     if (found.data == nullptr) return reportMissing("mask", node.mask), false;
     maskCount_ += std::exchange(reached_[number(Stream::mask)][found.local], kReached) == 0 ? 1 : 0;
-    measureActive(*as<Mask3>(found.data), facts);
-    boundLoosely(node, facts);
+    facts.measureActive(*as<Mask3>(found.data));
+    facts.boundValues(node, frame_.background);
   }
   checkMean(node, index);
   return true;
@@ -308,43 +267,8 @@ void GridWalk::measureExactly(const Node3& node, BrickFacts& facts) {
   Values values;
   Mask3 active;
   decodeBrick(node, mask, brick, frame_.background, values, active);
-  const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  facts.min = *low;
-  facts.max = *high;
-  facts.exact = true;
-  measureActive(active, facts);
-}
-
-// Bounds that need no decoding: what the brick can hold at most. Mostly they do.
-void GridWalk::boundLoosely(const Node3& node, BrickFacts& facts) const {
-  const float high = largestValue(node), background = frame_.background;
-  const bool none = facts.active == 0, all = facts.active == kBrickVoxels;
-  facts.min = none ? background : all ? node.lo : std::min(node.lo, background);
-  facts.max = none ? background : all ? high : std::max(high, background);
-  facts.exact = none || encodingOf(node) == kEncodingConstant;
-}
-
-void GridWalk::measureActive(const Mask3& mask, BrickFacts& facts) {
-  std::uint32_t even = 0, odd = 0, slabs = 0, count = 0;
-  for (std::uint32_t x = 0; x < 8; ++x) {
-    even |= mask.words[2 * x];
-    odd |= mask.words[2 * x + 1];
-    count += static_cast<std::uint32_t>(std::popcount(mask.words[2 * x]) + std::popcount(mask.words[2 * x + 1]));
-    if ((mask.words[2 * x] | mask.words[2 * x + 1]) != 0) slabs |= 1u << x;
-  }
-  facts.active = static_cast<std::uint16_t>(count);
-  if (count == 0) return;
-  std::uint32_t rows = 0, columns = 0;
-  for (std::uint32_t y = 0; y < 8; ++y) {
-    const std::uint32_t row = (y < 4 ? even : odd) >> (8 * (y & 3)) & 0xffu;
-    columns |= row;
-    if (row != 0) rows |= 1u << y;
-  }
-  const std::uint32_t axes[3] = {slabs, rows, columns};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    facts.low[axis] = static_cast<std::uint8_t>(std::countr_zero(axes[axis]));
-    facts.high[axis] = static_cast<std::uint8_t>(31 - std::countl_zero(axes[axis]));
-  }
+  facts.measureValues(values);
+  facts.measureActive(active);
 }
 
 void GridWalk::checkTotals() {

@@ -8,41 +8,11 @@
 #include <span>
 #include <vector>
 
-#include "billow/format/brick.h"
 #include "billow/format/gpu_size.h"
-#include "rules.h"
+#include "brick_facts.h"
+#include "item_finder.h"
 
 namespace billow::format {
-
-// Finds items by global index in the pages of one grid frame, and remembers which were found.
-class ItemFinder {
- public:
-  struct Run {
-    std::uint32_t first;
-    std::uint32_t count;
-    std::uint32_t local;  // number of the run's first item among those of this finder
-    std::uint32_t page;   // position in the list of pages
-    const std::byte* data;
-  };
-  struct Found {
-    const std::byte* data = nullptr;  // null: not in these pages
-    std::uint32_t local = 0;
-  };
-
-  ItemFinder(const Pack& pack, std::span<const Page> pages);
-
-  // `count` items that follow one another, all in one page.
-  Found find(Stream stream, std::uint32_t first, std::uint32_t count);
-  std::uint32_t localCount(Stream stream) const { return localCount_[static_cast<std::uint32_t>(stream)]; }
-  std::span<const Run> runs(Stream stream) const { return runs_[static_cast<std::uint32_t>(stream)]; }
-  std::span<const std::uint8_t> pagesUsed() const { return pagesUsed_; }
-
- private:
-  std::array<std::vector<Run>, kStreamCount> runs_;  // ascending, without empty ones
-  std::array<std::uint32_t, kStreamCount> localCount_{};
-  std::array<std::size_t, kStreamCount> last_{};  // neighbours mostly lie in the same run
-  std::vector<std::uint8_t> pagesUsed_;
-};
 
 // Checks everything that the grid frame reaches. Memory safe whatever the pages hold.
 class GridWalk {
@@ -68,14 +38,8 @@ class GridWalk {
   struct Box {  // of active voxels, inclusive, relative to the node; empty when low > high
     std::array<std::uint16_t, 3> low{0xffff, 0xffff, 0xffff};
     std::array<std::uint16_t, 3> high{0, 0, 0};
-    void add(const Box& box, const std::array<std::uint16_t, 3>& origin);
+    void add(const Box& box, const std::array<std::uint32_t, 3>& origin);
     bool empty() const { return low[0] > high[0]; }
-  };
-  struct BrickFacts {  // of a distinct Node3
-    float min = 0, max = 0;
-    std::uint16_t active = 0;
-    bool exact = false;  // min and max are of its values, not only of what it can hold
-    std::array<std::uint8_t, 3> low{}, high{};
   };
   struct SubtreeFacts {  // of a distinct Node4
     std::uint64_t active = 0;
@@ -107,8 +71,6 @@ class GridWalk {
   void countTile(float value);
   void checkMean(const Node3& node, std::uint32_t index);
   void measureExactly(const Node3& node, BrickFacts& facts);
-  void boundLoosely(const Node3& node, BrickFacts& facts) const;
-  static void measureActive(const Mask3& mask, BrickFacts& facts);
   void checkTotals();
   void checkBox();
   void checkPagesNeeded();
@@ -121,7 +83,7 @@ class GridWalk {
   ItemFinder finder_;
   const Node5* root_ = nullptr;
   std::array<std::vector<std::uint8_t>, kStreamCount> reached_;
-  std::vector<BrickFacts> bricks_;
+  std::vector<BrickFacts> bricks_;  // of distinct Node3s
   std::vector<SubtreeFacts> subtrees_;
   std::uint64_t node4Count_ = 0, node3Count_ = 0, maskCount_ = 0, childCount_ = 0, leafCount_ = 0, active_ = 0;
   GridFrame counted_{};            // brickUnits and brickCount of what was reached

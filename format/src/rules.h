@@ -194,7 +194,7 @@ struct TableView {
 };
 // All rules of the tables but those of the page table.
 void checkTables(const TableView& tables, IssueSink& sink);
-void checkPageTable(const TableView& tables, IssueSink& sink);
+void checkPageTable(const TableView& tables, IssueSink& sink);  // page_table_rules.cpp
 
 // Reads what Pack holds. In `pack` are the tables that could be read; false when a rule of header, contents or tables
 // is broken.

@@ -24,10 +24,6 @@ constexpr std::uint64_t aligned(std::uint64_t offset) {
 // Pages are written before anybody knows whether there will be an INFO section, so room is kept for its entry.
 constexpr std::uint64_t kPagesOffset = aligned(sizeof(FileHeader) + kMostSections * sizeof(SectionEntry));
 
-// Global indices are 32 bits wide, those of units 27 (beside the encoding) and those of masks 31.
-constexpr std::uint64_t kStreamLimit[kStreamCount] = {
-    std::uint64_t{kBrickUnitMask} + 1, kMaskIndexLimit, kNone, kNone, kNone, kNone};
-
 template <class T>
 std::span<const std::byte> bytesOf(const std::vector<T>& items) {
   return std::as_bytes(std::span<const T>(items));

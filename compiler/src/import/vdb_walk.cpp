@@ -7,6 +7,7 @@
 #include <set>
 #include <vector>
 
+#include "billow/format/children.h"
 #include "stages.h"
 
 namespace billow::compiler {
@@ -95,11 +96,10 @@ class Walker {
   }
 
   static Origin childOrigin(const Origin& origin, std::uint32_t index, std::uint32_t log2, std::uint32_t childLog2) {
-    const std::uint32_t mask = (1u << log2) - 1;
-    const std::array<std::uint32_t, 3> at{index >> (2 * log2), index >> log2 & mask, index & mask};
+    const std::array<std::uint32_t, 3> offset = format::childOrigin(index, log2, childLog2);
     Origin child{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      child[axis] = origin[axis] + static_cast<std::int32_t>(at[axis] << childLog2);
+      child[axis] = origin[axis] + static_cast<std::int32_t>(offset[axis]);
     }
     return child;
   }

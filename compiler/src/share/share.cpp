@@ -9,6 +9,8 @@
 #include <memory>
 #include <tuple>
 
+#include "billow/format/bfloat16.h"
+#include "billow/format/children.h"
 #include "billow/format/gpu_size.h"
 
 namespace billow::compiler {
@@ -31,16 +33,6 @@ constexpr std::uint32_t kNode5Children = 1u << (3 * format::kNode5Log2);
 
 // A tile that is cut up because the grid's origin is not aligned with it may become at most this many small ones.
 constexpr std::uint64_t kMaxCutTiles = 1u << 24;
-
-std::uint32_t childBit(const std::array<std::uint32_t, 3>& at, std::uint32_t spanLog2, std::uint32_t log2) {
-  const std::uint32_t mask = (1u << log2) - 1;
-  return (at[0] >> spanLog2 & mask) << (2 * log2) | (at[1] >> spanLog2 & mask) << log2 | (at[2] >> spanLog2 & mask);
-}
-
-// The nearest float whose lower 16 bits are 0. The mean serves drawing from afar; its low bits would be noise on disk.
-float upperHalf(float value) {
-  return std::bit_cast<float>((std::bit_cast<std::uint32_t>(value) + 0x8000u) & 0xffff0000u);
-}
 
 void growPages(std::vector<std::uint32_t>& pages, std::uint32_t page) {
   if (pages.empty() || pages.back() != page) pages.push_back(page);
@@ -109,8 +101,8 @@ class TreeBuilder {
   }
 
   void put3(const std::array<std::uint32_t, 3>& at, const Summary& summary) {
-    const std::uint32_t parent = childBit(at, format::kNode4SpanLog2, format::kNode5Log2);
-    nodes4_[parent][childBit(at, format::kNode3SpanLog2, format::kNode4Log2)] = summary;
+    const std::uint32_t parent = format::childBit(at, format::kNode5Log2, format::kNode4SpanLog2);
+    nodes4_[parent][format::childBit(at, format::kNode4Log2, format::kNode3SpanLog2)] = summary;
   }
 
   void addLeaves() {
@@ -170,7 +162,8 @@ class TreeBuilder {
     const float max = *std::max_element(highs, highs + kSums);
     const double sum = ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]));
     const float mean = std::clamp(static_cast<float>(sum / format::kBrickVoxels), min, max);
-    const float rounded = upperHalf(mean);
+    // The mean serves drawing from afar; its low bits would be noise on disk.
+    const float rounded = format::fromBfloat16(format::toBfloat16(mean));
     node.mean = min <= rounded && rounded <= max ? rounded : mean;
     const std::uint32_t index = intern(Stream::node3, &node, 1);
     nodes3_.push_back(index);
@@ -185,7 +178,7 @@ class TreeBuilder {
       } else if (tile.dim == 8) {
         put3(at, addSmallTile(tile.value));
       } else if ((at[0] | at[1] | at[2]) % tile.dim == 0) {
-        tiles4_.emplace_back(childBit(at, format::kNode4SpanLog2, format::kNode5Log2), tile.value);
+        tiles4_.emplace_back(format::childBit(at, format::kNode5Log2, format::kNode4SpanLog2), tile.value);
       } else {
         cutTile(at, tile);
       }

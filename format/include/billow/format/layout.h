@@ -275,6 +275,9 @@ BILLOW_ASSERT_SIZE(GridFrame, 248);
 enum class Stream : std::uint32_t { unit = 0, mask = 1, node5 = 2, node4 = 3, node3 = 4, child = 5 };
 inline constexpr std::uint32_t kStreamCount = 6;
 inline constexpr std::uint32_t kStreamItemBytes[kStreamCount] = {kBrickUnitBytes, 64, 4120, 536, 20, 4};
+// Items that an array can have: its indices are 32 bits wide, those of units 27 (beside the encoding), of masks 31.
+inline constexpr std::uint64_t kStreamLimit[kStreamCount] = {
+    std::uint64_t{kBrickUnitMask} + 1, kMaskIndexLimit, kNone, kNone, kNone, kNone};
 inline constexpr std::uint32_t kMaxPageBytes = 1u << 20;  // raw; a reader may refuse more
 
 struct StreamRange {  // [first, first + count) of the stream's global array
