@@ -134,6 +134,23 @@ constexpr IssueKind kCatalogue[] = {
     error(Rule::activeBox, "active-box", "The active box holds every active voxel."),
     warning(Rule::activeBoxLoose, "active-box-loose", "The active box is no larger than its active voxels need."),
     error(Rule::valueRange, "value-range", "A grid frame's value range holds its root's range."),
+
+    error(Rule::effectRanges, "effect-ranges",
+          "The effects divide the emitters among themselves, at most 64 each, and the emitters the spans, 1 to 128 "
+          "each, in order and without remainder."),
+    error(Rule::effectValues, "effect-values",
+          "An effect has no reserved flags, is warm from the start only if it loops, and lasts from 0.01 to 3600 s."),
+    error(Rule::effectAlive, "effect-alive", "No more than 65536 particles of an effect can be alive at once."),
+    error(Rule::emitterValues, "emitter-values", "An emitter's numbers are finite and in range."),
+    error(Rule::emitterSpans, "emitter-spans",
+          "An emitter's spans lie within its effect's duration and number 1 to 1048576 particles, one after another."),
+    error(Rule::effectReference, "effect-reference",
+          "The curves, ramps, cube maps and material that are referred to exist."),
+    error(Rule::materialProfile, "material-profile",
+          "A material's profile is known, and it has a curve that exists exactly if its profile is one."),
+    error(Rule::materialValues, "material-values", "A material's numbers are finite and in range."),
+    error(Rule::effectTable, "effect-table",
+          "Values of curves lie in [-1000000, 1000000], those of ramps in [0, 1000000]."),
 };
 
 consteval bool ascending() {

@@ -53,6 +53,17 @@ void readTable(const ByteSource& source, std::span<const SectionEntry> sections,
   }
 }
 
+void readEffects(const ByteSource& source, std::span<const SectionEntry> sections, EffectTables& effects,
+                 IssueSink& sink) {
+  readTable(source, sections, kSectionEffects, effects.effects, sink);
+  readTable(source, sections, kSectionEmitters, effects.emitters, sink);
+  readTable(source, sections, kSectionSpans, effects.spans, sink);
+  readTable(source, sections, kSectionMaterials, effects.materials, sink);
+  readTable(source, sections, kSectionCurves, effects.curves, sink);
+  readTable(source, sections, kSectionRamps, effects.ramps, sink);
+  readTable(source, sections, kSectionCubes, effects.maps, sink);
+}
+
 }  // namespace
 
 bool PackReader::read(std::unique_ptr<ByteSource> source, Pack& pack, FileHeader& header, IssueSink& sink) {
@@ -69,15 +80,17 @@ bool PackReader::read(std::unique_ptr<ByteSource> source, Pack& pack, FileHeader
   readTable(bytes, pack.sections_, kSectionGridFrames, pack.gridFrames_, sink);
   readTable(bytes, pack.sections_, kSectionPageLists, pack.pageLists_, sink);
   readTable(bytes, pack.sections_, kSectionPageTable, pack.pages_, sink);
+  readEffects(bytes, pack.sections_, pack.effects_, sink);
   if (sink.stopped()) return false;
   checkTables(view(pack), sink);
   checkPageTable(view(pack), sink);
+  checkEffects(view(pack), sink);
   return sink.errors() == before;
 }
 
 TableView PackReader::view(const Pack& pack) {
-  return {pack.sections_, pack.strings_,    pack.volumes_,   pack.grids_,
-          pack.frames_,   pack.gridFrames_, pack.pageLists_, pack.pages_};
+  return {pack.sections_,   pack.strings_,   pack.volumes_, pack.grids_,   pack.frames_,
+          pack.gridFrames_, pack.pageLists_, pack.pages_,   &pack.effects_};
 }
 
 Result<Pack> Pack::open(std::unique_ptr<ByteSource> source) {

@@ -30,6 +30,13 @@ constexpr SectionKind kSectionKinds[] = {
     {"PLST", kSectionPageLists, kSectionRequired},
     {"PDIR", kSectionPageTable, kSectionRequired},
     {"INFO", kSectionInfo, 0},
+    {"EFCT", kSectionEffects, 0},
+    {"EMIT", kSectionEmitters, 0},
+    {"SPWN", kSectionSpans, 0},
+    {"MTRL", kSectionMaterials, 0},
+    {"CURV", kSectionCurves, 0},
+    {"RAMP", kSectionRamps, 0},
+    {"CUBE", kSectionCubes, 0},
 };
 
 const SectionKind* kindOfSection(std::uint32_t type) {

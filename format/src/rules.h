@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -115,6 +116,16 @@ enum class Rule : std::uint16_t {
   activeBox = 603,
   activeBoxLoose = 604,
   valueRange = 605,
+
+  effectRanges = 701,
+  effectValues = 702,
+  effectAlive = 703,
+  emitterValues = 704,
+  emitterSpans = 705,
+  effectReference = 706,
+  materialProfile = 707,
+  materialValues = 708,
+  effectTable = 709,
 };
 
 // The catalogue's entry; the id must be in it.
@@ -186,6 +197,7 @@ struct TableView {
   std::span<const GridFrame> gridFrames;
   std::span<const std::uint32_t> pageLists;
   std::span<const PageRecord> pages;
+  const EffectTables* effects;
 
   // Where byte `byte` of a table lies in the file.
   Place place(std::uint32_t section, std::uint64_t byte) const;
@@ -195,6 +207,10 @@ struct TableView {
 // All rules of the tables but those of the page table.
 void checkTables(const TableView& tables, IssueSink& sink);
 void checkPageTable(const TableView& tables, IssueSink& sink);  // page_table_rules.cpp
+void checkEffects(const TableView& tables, IssueSink& sink);    // effect_rules.cpp
+// Whether the name can be used; `seen` are the names that it must differ from, and gets it.
+void checkName(const TableView& tables, StringRef ref, const Place& place, std::set<std::string_view>& seen,
+               IssueSink& sink);
 
 // Reads what Pack holds. In `pack` are the tables that could be read; false when a rule of header, contents or tables
 // is broken.

@@ -24,22 +24,6 @@ std::string_view textOf(const TableView& tables, StringRef ref) {
   return tables.strings.substr(ref.offset, ref.size);
 }
 
-// Whether the name can be used; `seen` are the names that it must differ from.
-void checkName(const TableView& tables, StringRef ref, const Place& place, std::set<std::string_view>& seen,
-               IssueSink& sink) {
-  if (ref.offset > tables.strings.size() || ref.size > tables.strings.size() - ref.offset) {
-    return sink.report(Rule::stringRange, place,
-                       fmt::format("{} bytes at {} of {}.", ref.size, ref.offset, tables.strings.size()));
-  }
-  const std::string_view name = textOf(tables, ref);
-  if (!isUtf8(name)) return sink.report(Rule::stringRange, place, "It is cut inside of a character.");
-  const bool control = std::any_of(name.begin(), name.end(), isControl);
-  if (name.empty() || control) {
-    return sink.report(Rule::nameEmpty, place, name.empty() ? "It is empty." : "It has control characters.");
-  }
-  if (!seen.insert(name).second) sink.report(Rule::nameDuplicate, place, fmt::format("\"{}\" occurs twice.", name));
-}
-
 template <std::size_t N>
 bool allZero(const std::uint32_t (&values)[N]) {
   return std::all_of(std::begin(values), std::end(values), [](std::uint32_t value) { return value == 0; });
@@ -265,6 +249,21 @@ Place TableView::gridFramePlace(std::uint64_t index) const {
   at.grid = static_cast<std::uint32_t>(local % volume.gridCount);
   if (frame < frames.size()) at.frame = frames[frame].number;
   return at;
+}
+
+void checkName(const TableView& tables, StringRef ref, const Place& place, std::set<std::string_view>& seen,
+               IssueSink& sink) {
+  if (ref.offset > tables.strings.size() || ref.size > tables.strings.size() - ref.offset) {
+    return sink.report(Rule::stringRange, place,
+                       fmt::format("{} bytes at {} of {}.", ref.size, ref.offset, tables.strings.size()));
+  }
+  const std::string_view name = textOf(tables, ref);
+  if (!isUtf8(name)) return sink.report(Rule::stringRange, place, "It is cut inside of a character.");
+  const bool control = std::any_of(name.begin(), name.end(), isControl);
+  if (name.empty() || control) {
+    return sink.report(Rule::nameEmpty, place, name.empty() ? "It is empty." : "It has control characters.");
+  }
+  if (!seen.insert(name).second) sink.report(Rule::nameDuplicate, place, fmt::format("\"{}\" occurs twice.", name));
 }
 
 void checkTables(const TableView& tables, IssueSink& sink) {

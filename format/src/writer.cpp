@@ -16,13 +16,16 @@ namespace billow::format {
 namespace {
 
 constexpr std::uint32_t kMostSections = 9;
+constexpr std::uint32_t kEffectSections = 7;
 
 constexpr std::uint64_t aligned(std::uint64_t offset) {
   return (offset + kSectionAlignment - 1) / kSectionAlignment * kSectionAlignment;
 }
 
 // Pages are written before anybody knows whether there will be an INFO section, so room is kept for its entry.
-constexpr std::uint64_t kPagesOffset = aligned(sizeof(FileHeader) + kMostSections * sizeof(SectionEntry));
+constexpr std::uint64_t pagesOffset(bool effects) {
+  return aligned(sizeof(FileHeader) + (kMostSections + (effects ? kEffectSections : 0)) * sizeof(SectionEntry));
+}
 
 template <class T>
 std::span<const std::byte> bytesOf(const std::vector<T>& items) {
@@ -42,7 +45,10 @@ StringRef PackTables::addString(const std::string& text) {
 
 struct PackWriter::Impl {
   Impl(std::string path, Options given)
-      : options(given), file(std::move(path)), compressor(given.compression, given.threads) {
+      : options(given),
+        file(std::move(path)),
+        pagesBegin(pagesOffset(given.effects)),
+        compressor(given.compression, given.threads) {
     options.pageBytes = std::clamp<std::uint32_t>(options.pageBytes, 1, kMaxPageBytes);
   }
 
@@ -50,10 +56,12 @@ struct PackWriter::Impl {
   void closePage();
   void writeOldest();
   void writeSection(std::uint32_t type, std::uint32_t flags, std::span<const std::byte> bytes);
+  void writeEffects(const EffectTables& effects);
   void writeHeader();
 
   Options options;
   TempFile file;
+  std::uint64_t pagesBegin;
   PageCompressor compressor;
   std::array<std::vector<std::byte>, kStreamCount> open;  // the page under construction
   std::uint64_t openBytes = 0;
@@ -110,7 +118,7 @@ void PackWriter::Impl::writeOldest() {
   record.storedSize = static_cast<std::uint32_t>(page.stored.size());
   record.codec = static_cast<std::uint32_t>(page.codec);
   pageHasher.add(page.stored);
-  file.write(kPagesOffset + pageSectionBytes, page.stored);
+  file.write(pagesBegin + pageSectionBytes, page.stored);
   pageSectionBytes += page.stored.size();
 }
 
@@ -119,6 +127,19 @@ void PackWriter::Impl::writeSection(std::uint32_t type, std::uint32_t flags, std
   file.write(offset, bytes);
   sections.push_back({type, flags, offset, bytes.size(), hashBytes(bytes)});
   end = offset + bytes.size();
+}
+
+void PackWriter::Impl::writeEffects(const EffectTables& effects) {
+  const auto write = [&](std::uint32_t type, const auto& records) {
+    if (!records.empty()) writeSection(type, 0, bytesOf(records));
+  };
+  write(kSectionEffects, effects.effects);
+  write(kSectionEmitters, effects.emitters);
+  write(kSectionSpans, effects.spans);
+  write(kSectionMaterials, effects.materials);
+  write(kSectionCurves, effects.curves);
+  write(kSectionRamps, effects.ramps);
+  write(kSectionCubes, effects.maps);
 }
 
 void PackWriter::Impl::writeHeader() {
@@ -168,8 +189,8 @@ std::uint64_t PackWriter::close(const PackTables& tables) {
   impl.closePage();
   while (!impl.compressor.empty()) impl.writeOldest();
   impl.sections.push_back(
-      {kSectionPages, kSectionRequired, kPagesOffset, impl.pageSectionBytes, impl.pageHasher.digest()});
-  impl.end = kPagesOffset + impl.pageSectionBytes;
+      {kSectionPages, kSectionRequired, impl.pagesBegin, impl.pageSectionBytes, impl.pageHasher.digest()});
+  impl.end = impl.pagesBegin + impl.pageSectionBytes;
   impl.writeSection(kSectionStrings, kSectionRequired, std::as_bytes(std::span(tables.strings)));
   impl.writeSection(kSectionVolumes, kSectionRequired, bytesOf(tables.volumes));
   impl.writeSection(kSectionGrids, kSectionRequired, bytesOf(tables.grids));
@@ -178,6 +199,8 @@ std::uint64_t PackWriter::close(const PackTables& tables) {
   impl.writeSection(kSectionPageLists, kSectionRequired, bytesOf(tables.pageLists));
   impl.writeSection(kSectionPageTable, kSectionRequired, bytesOf(impl.pages));
   if (!tables.infoJson.empty()) impl.writeSection(kSectionInfo, 0, std::as_bytes(std::span(tables.infoJson)));
+  if (!tables.effects.empty() && !impl.options.effects) throw std::logic_error("PackWriter: no room for effects");
+  impl.writeEffects(tables.effects);
   impl.writeHeader();
   return impl.end;
 }

@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "billow/format/effect.h"
 #include "billow/format/validate.h"
 #include "pack_image.h"
 #include "sample_pack.h"
@@ -98,6 +99,34 @@ const std::map<std::string, Layout>& layouts() {
       {"Node3",
        {sizeof(Node3),
         {FIELD(Node3, brick), FIELD(Node3, mask), FIELD(Node3, lo), FIELD(Node3, scale), FIELD(Node3, mean)}}},
+      {"EffectRecord",
+       {sizeof(EffectRecord),
+        {FIELD(EffectRecord, name), FIELD(EffectRecord, firstEmitter), FIELD(EffectRecord, emitterCount),
+         FIELD(EffectRecord, flags), FIELD(EffectRecord, seed), FIELD(EffectRecord, duration),
+         FIELD(EffectRecord, reserved)}}},
+      {"SpawnSpan",
+       {sizeof(SpawnSpan),
+        {FIELD(SpawnSpan, begin), FIELD(SpawnSpan, end), FIELD(SpawnSpan, first), FIELD(SpawnSpan, count)}}},
+      {"EmitterRecord",
+       {sizeof(EmitterRecord),
+        {FIELD(EmitterRecord, name),        FIELD(EmitterRecord, firstSpan),    FIELD(EmitterRecord, spanCount),
+         FIELD(EmitterRecord, flags),       FIELD(EmitterRecord, shape),        FIELD(EmitterRecord, extent),
+         FIELD(EmitterRecord, position),    FIELD(EmitterRecord, positionRow),  FIELD(EmitterRecord, inheritance),
+         FIELD(EmitterRecord, lifetime),    FIELD(EmitterRecord, direction),    FIELD(EmitterRecord, spreadCosine),
+         FIELD(EmitterRecord, speed),       FIELD(EmitterRecord, gravity),      FIELD(EmitterRecord, drag),
+         FIELD(EmitterRecord, wind),        FIELD(EmitterRecord, kind),         FIELD(EmitterRecord, radius),
+         FIELD(EmitterRecord, radiusRow),   FIELD(EmitterRecord, proportions),  FIELD(EmitterRecord, extinction),
+         FIELD(EmitterRecord, opacityRow),  FIELD(EmitterRecord, diffuse),      FIELD(EmitterRecord, diffuseRow),
+         FIELD(EmitterRecord, emission),    FIELD(EmitterRecord, emissionRow),  FIELD(EmitterRecord, axis),
+         FIELD(EmitterRecord, rotationRow), FIELD(EmitterRecord, displacement), FIELD(EmitterRecord, displacementRow),
+         FIELD(EmitterRecord, firstMap),    FIELD(EmitterRecord, mapCount),     FIELD(EmitterRecord, mapsPerSecond),
+         FIELD(EmitterRecord, material),    FIELD(EmitterRecord, reserved)}}},
+      {"ParticleMaterial",
+       {sizeof(ParticleMaterial),
+        {FIELD(ParticleMaterial, profile), FIELD(ParticleMaterial, profileRow), FIELD(ParticleMaterial, diffuseRamp),
+         FIELD(ParticleMaterial, emissionRamp), FIELD(ParticleMaterial, erosion),
+         FIELD(ParticleMaterial, erosionFrequency), FIELD(ParticleMaterial, occlusion),
+         FIELD(ParticleMaterial, softness)}}},
       {"Mask3", {sizeof(Mask3), {FIELD(Mask3, words)}}}};
   return all;
 }
@@ -150,7 +179,8 @@ std::string issuesDocument() {
                                                     {3, "Pages (3xx)"},
                                                     {4, "Nodes (4xx)"},
                                                     {5, "Bricks (5xx)"},
-                                                    {6, "Grid frames against their trees (6xx)"}};
+                                                    {6, "Grid frames against their trees (6xx)"},
+                                                    {7, "Effects (7xx)"}};
   std::string text =
       "# Every rule of a pack\n\n"
       "Generated from the catalogue in the code; see [format.md](format.md) for the rules in full. Each sentence is "

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "billow/format/effect.h"
 #include "billow/format/layout.h"
 #include "billow/format/result.h"
 #include "billow/format/source.h"
@@ -37,6 +38,7 @@ class Pack {
   std::span<const GridFrame> gridFrames() const { return gridFrames_; }
   std::span<const std::uint32_t> pageLists() const { return pageLists_; }
   std::span<const PageRecord> pages() const { return pages_; }
+  const EffectTables& effects() const { return effects_; }  // empty where the pack has none
   std::string_view string(StringRef ref) const;
   std::uint64_t fileSize() const;
   const ByteSource& source() const { return *source_; }
@@ -65,6 +67,7 @@ class Pack {
   std::vector<GridFrame> gridFrames_;
   std::vector<std::uint32_t> pageLists_;
   std::vector<PageRecord> pages_;
+  EffectTables effects_;
 };
 
 }  // namespace billow::format

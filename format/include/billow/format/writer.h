@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "billow/format/effect.h"
 #include "billow/format/layout.h"
 
 namespace billow::format {
@@ -22,6 +23,7 @@ struct PackTables {
   std::vector<std::uint32_t> pageLists;
   std::string strings;
   std::string infoJson;  // "" writes no INFO section
+  EffectTables effects;  // tables without a record write no section
 
   StringRef addString(const std::string& text);  // equal strings share
 };
@@ -37,6 +39,7 @@ class PackWriter {
   struct Options {
     std::uint32_t pageBytes = 128u << 10;  // raw bytes at which a page is closed
     Compression compression = Compression::small;
+    bool effects = false;  // whether the tables will have effects: room is kept for the entries of their sections
     unsigned threads = 0;  // that compress pages; 0: as many as the machine has, at most 8. The bytes are the same.
   };
   PackWriter(std::string path, Options options);

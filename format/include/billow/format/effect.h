@@ -1,0 +1,134 @@
+// Effects in a pack: emitters of particles, evaluated at any time without history. spec/effects.md is the standard.
+#ifndef BILLOW_FORMAT_EFFECT_H
+#define BILLOW_FORMAT_EFFECT_H
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "billow/format/cube_map.h"
+#include "billow/format/layout.h"
+#include "billow/format/particle.h"
+
+namespace billow::format {
+
+// ---- Limits. A pack or description beyond them is refused.
+inline constexpr std::uint32_t kMaxAlive = 65536;                  // particles of an effect at once, by mostAlive()
+inline constexpr std::uint32_t kMaxCycleParticles = 1048576;       // born by an emitter in one run of its effect
+inline constexpr std::uint32_t kMaxEmitters = 64;                  // of an effect
+inline constexpr std::uint32_t kMaxSpans = 128;                    // of an emitter
+inline constexpr std::uint32_t kMaxAnimatedMaps = 64;              // of an emitter
+inline constexpr float kMinDuration = 0.01f, kMaxDuration = 3600;  // seconds
+inline constexpr float kMaxLifetime = 600;                         // seconds
+inline constexpr float kMaxMagnitude = 1e6f;                       // of lengths, speeds, colours and values of tables
+inline constexpr float kMaxDrag = 1000;                            // a second
+inline constexpr float kMaxErosionFrequency = 1024;
+inline constexpr double kMaxEffectTime = 1e6;  // seconds
+
+inline constexpr std::uint32_t kEffectLoop = 1;     // EffectRecord.flags: runs again and again
+inline constexpr std::uint32_t kEffectPrewarm = 2;  // with kEffectLoop: it has always run
+
+// An effect: emitters that work together. It runs from 0 to `duration`; its particles may live on.
+struct EffectRecord {
+  StringRef name;
+  std::uint32_t firstEmitter;
+  std::uint32_t emitterCount;
+  std::uint32_t flags;
+  std::uint32_t seed;
+  float duration;  // seconds
+  std::uint32_t reserved[5];
+};
+static_assert(sizeof(EffectRecord) == 48);
+
+// Particles `first` to first + count - 1 of a run are born in it: the i-th at begin + (end - begin) * (i + u) / count
+// seconds, u random in [0, 1). A burst has end = begin.
+struct SpawnSpan {
+  float begin, end;
+  std::uint32_t first;
+  std::uint32_t count;
+};
+static_assert(sizeof(SpawnSpan) == 16);
+
+enum class EmitterShape : std::uint32_t { point = 0, sphere = 1, box = 2 };
+inline constexpr std::uint32_t kEmitterShapeCount = 3;
+
+inline constexpr std::uint32_t kEmitterAlign = 1;        // EmitterRecord.flags: own x axis along the velocity
+inline constexpr std::uint32_t kEmitterRandomStart = 2;  // rotation begins anywhere
+
+// Rows are of CURV, or kNoRow for 1 (position and rotation: 0); three rows are consecutive. Those of a life are read at
+// a particle's age / lifetime, those of the position at time / duration.
+struct EmitterRecord {
+  StringRef name;
+  std::uint32_t firstSpan;
+  std::uint32_t spanCount;
+  std::uint32_t flags;
+  std::uint32_t shape;  // EmitterShape
+  float extent[3];      // sphere: radius, share of the radius that is hollow, 0; box: half sides; point: 0
+  float position[3];
+  std::uint32_t positionRow;  // of three, added to `position`
+  float inheritance;          // share of the emitter's own velocity that particles begin with
+  float lifetime[2];          // seconds, least and most
+  float direction[3];         // unit
+  float spreadCosine;         // of the half angle around it
+  float speed[2];
+  float gravity[3];
+  float drag;  // 1 / second
+  float wind[3];
+  std::uint32_t kind;  // of the particles, below: kKind...
+  float radius[2];
+  std::uint32_t radiusRow;
+  float proportions[3];  // Particle.shape over the radius
+  float extinction;      // 1 / world unit
+  std::uint32_t opacityRow;
+  float diffuse[3];
+  std::uint32_t diffuseRow;  // of three
+  float emission[3];
+  std::uint32_t emissionRow;  // of three
+  float axis[3];              // of rotation, unit; 0 0 0: a random one for each particle
+  std::uint32_t rotationRow;  // turns
+  float displacement;
+  std::uint32_t displacementRow;
+  std::uint32_t firstMap;  // kNoMap: none
+  std::uint32_t mapCount;  // several: one after another, in a circle
+  float mapsPerSecond;
+  std::uint32_t material;
+  std::uint32_t reserved[8];
+};
+static_assert(sizeof(EmitterRecord) == 256);
+
+struct CurveRow {
+  float values[kCurveSamples];
+};
+struct RampTable {
+  float values[kRampAges][kRampRadii][4];  // r, g, b, unused
+};
+
+struct EffectTables {
+  std::vector<EffectRecord> effects;
+  std::vector<EmitterRecord> emitters;
+  std::vector<SpawnSpan> spans;
+  std::vector<ParticleMaterial> materials;
+  std::vector<CurveRow> curves;
+  std::vector<RampTable> ramps;
+  std::vector<CubeMap> maps;
+
+  bool empty() const { return effects.empty(); }
+};
+
+// Linear between a row's samples; x is clamped to [0, 1].
+float sampleCurve(const CurveRow& row, float x);
+
+// No more particles of the emitter than this are alive at any time. From the spans' and the lifetime's numbers alone,
+// so at most two more a span than can be.
+std::uint64_t mostAlive(const EmitterRecord& emitter, std::span<const SpawnSpan> spans, float duration, bool loop);
+// Of all emitters of an effect.
+std::uint64_t mostAlive(const EffectTables& tables, const EffectRecord& effect);
+
+// What is alive of an effect `time` seconds after its begin, in [0, kMaxEffectTime], else nothing; by emitter, then in
+// order of birth's number. The same bits on every machine. `tables` must keep the rules (those of an open pack do).
+std::vector<Particle> particlesAt(const EffectTables& tables, std::uint32_t effect, double time);
+
+}  // namespace billow::format
+
+#endif  // BILLOW_FORMAT_EFFECT_H

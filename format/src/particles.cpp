@@ -1,0 +1,340 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "billow/format/effect.h"
+#include "billow/format/exact_math.h"
+#include "billow/format/noise.h"
+
+namespace billow::format {
+namespace {
+
+using Vec3 = std::array<double, 3>;
+using Quaternion = std::array<double, 4>;  // x y z w
+
+// What a particle's random numbers are for; never renumber.
+enum class Draw : std::uint32_t {
+  birth = 0,
+  lifetime = 1,
+  placeA = 2,  // three in a row
+  directionA = 5,
+  directionB = 6,
+  speed = 7,
+  radius = 8,
+  axisA = 9,
+  axisB = 10,
+  angle = 11,
+  map = 12,
+};
+
+// The random numbers of one particle.
+class Dice {
+ public:
+  Dice(std::uint32_t effectSeed, std::uint32_t emitter, std::uint32_t number)
+      : seed_(hashInteger(hashInteger(hashInteger(effectSeed) + emitter) + number)) {}
+
+  std::uint32_t seed() const { return seed_; }
+  double draw(Draw what, std::uint32_t further = 0) const {
+    return static_cast<double>(unitOf(hashInteger(seed_ + static_cast<std::uint32_t>(what) + further)));
+  }
+  double between(Draw what, const float (&range)[2]) const {
+    const double low = static_cast<double>(range[0]);
+    return low + (static_cast<double>(range[1]) - low) * draw(what);
+  }
+
+ private:
+  std::uint32_t seed_;
+};
+
+Vec3 vec(const float (&v)[3]) {
+  return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
+}
+
+// Uniform over the part of the unit sphere within the cone around the z axis: Archimedes.
+Vec3 coneDirection(double cosine, double a, double b) {
+  const double z = 1 - a * (1 - cosine);
+  const double r = std::sqrt(std::max(0.0, 1 - z * z));
+  const SineCosine turn = sineCosine(b);
+  return {r * turn.cosine, r * turn.sine, z};
+}
+
+// The vector in a frame whose z axis is `axis`, of unit length (Duff et al. 2017, "Building an Orthonormal Basis,
+// Revisited").
+Vec3 around(const Vec3& axis, const Vec3& v) {
+  const double sign = axis[2] < 0 ? -1 : 1;
+  const double a = -1 / (sign + axis[2]);
+  const double b = axis[0] * axis[1] * a;
+  const Vec3 x{1 + sign * axis[0] * axis[0] * a, sign * b, -sign * axis[0]};
+  const Vec3 y{b, sign + axis[1] * axis[1] * a, -axis[1]};
+  Vec3 result{};
+  for (std::size_t i = 0; i < 3; ++i) result[i] = x[i] * v[0] + y[i] * v[1] + axis[i] * v[2];
+  return result;
+}
+
+Quaternion turned(const Vec3& axis, double turns) {
+  const SineCosine half = sineCosine(turns / 2);
+  return {axis[0] * half.sine, axis[1] * half.sine, axis[2] * half.sine, half.cosine};
+}
+
+Quaternion product(const Quaternion& a, const Quaternion& b) {
+  return {a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1], a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
+          a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3], a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]};
+}
+
+// The shortest turn of the x axis to the velocity's direction; none where it is at rest.
+Quaternion alongVelocity(const Vec3& velocity) {
+  const double length = std::sqrt(velocity[0] * velocity[0] + velocity[1] * velocity[1] + velocity[2] * velocity[2]);
+  if (!(length > 0)) return {0, 0, 0, 1};
+  const Vec3 d{velocity[0] / length, velocity[1] / length, velocity[2] / length};
+  const double w = 1 + d[0];
+  const double norm = std::sqrt(d[2] * d[2] + d[1] * d[1] + w * w);
+  if (!(norm > 1e-6)) return {0, 0, 1, 0};  // backward: any half turn
+  return {0, -d[2] / norm, d[1] / norm, w / norm};
+}
+
+// One emitter in one run, ready to be asked for its particles.
+class EmitterRun {
+ public:
+  EmitterRun(const EffectTables& tables, const EffectRecord& effect, std::uint32_t number, double time)
+      : tables_(tables),
+        emitter_(tables.emitters[effect.firstEmitter + number]),
+        spans_(std::span(tables.spans).subspan(emitter_.firstSpan, emitter_.spanCount)),
+        duration_(static_cast<double>(effect.duration)),
+        seed_(effect.seed),
+        number_(number),
+        time_(time) {}
+
+  // Those of run `cycle` that are alive.
+  void append(std::int64_t cycle, std::vector<Particle>& into) const {
+    const double begin = static_cast<double>(cycle) * duration_;
+    const double now = time_ - begin;
+    const std::uint32_t total = spans_.empty() ? 0 : spans_.back().first + spans_.back().count;
+    const std::uint32_t before = static_cast<std::uint32_t>(static_cast<std::uint64_t>(cycle)) * total;
+    for (const SpawnSpan& span : spans_) {
+      const auto [first, last] = candidates(span, now);
+      for (std::uint32_t i = first; i < last; ++i) {
+        const Dice dice(seed_, number_, before + span.first + i);
+        const double share = (i + dice.draw(Draw::birth)) / span.count;
+        const double from = static_cast<double>(span.begin);
+        const double born = from + (static_cast<double>(span.end) - from) * share;
+        const double age = now - born;
+        const double lifetime = dice.between(Draw::lifetime, emitter_.lifetime);
+        if (age >= 0 && age < lifetime) into.push_back(particle(dice, born, age, lifetime));
+      }
+    }
+  }
+
+ private:
+  struct Range {
+    std::uint32_t first, last;
+  };
+  // Which of a span's particles may be alive `now` seconds into the run: a few too many.
+  Range candidates(const SpawnSpan& span, double now) const {
+    const double begin = static_cast<double>(span.begin), length = static_cast<double>(span.end) - begin;
+    const double oldest = now - static_cast<double>(emitter_.lifetime[1]) - begin, youngest = now - begin;
+    if (youngest < 0 || oldest > length) return {0, 0};
+    if (!(length > 0)) return {0, span.count};
+    const auto index = [&](double seconds) {
+      return static_cast<std::uint32_t>(std::clamp<double>(seconds / length * span.count, 0, span.count));
+    };
+    const std::uint32_t first = index(oldest);
+    return {first - std::min(first, 1u), std::min(index(youngest) + 1, span.count)};
+  }
+
+  double row(std::uint32_t index, double x, double absent) const {
+    return index == kNoRow ? absent : static_cast<double>(sampleCurve(tables_.curves[index], static_cast<float>(x)));
+  }
+
+  // Where the emitter is, and how fast it goes, `seconds` into the run.
+  Vec3 place(double seconds) const {
+    Vec3 at = vec(emitter_.position);
+    if (emitter_.positionRow == kNoRow) return at;
+    for (std::uint32_t i = 0; i < 3; ++i) at[i] += row(emitter_.positionRow + i, seconds / duration_, 0);
+    return at;
+  }
+  Vec3 velocity(double seconds) const {
+    if (emitter_.positionRow == kNoRow) return {0, 0, 0};
+    const double step = duration_ / (kCurveSamples - 1);
+    const auto sample = static_cast<std::size_t>(std::clamp<double>(std::floor(seconds / step), 0, kCurveSamples - 2));
+    Vec3 speed{};
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      const float(&values)[kCurveSamples] = tables_.curves[emitter_.positionRow + i].values;
+      speed[i] = (static_cast<double>(values[sample + 1]) - static_cast<double>(values[sample])) / step;
+    }
+    return speed;
+  }
+
+  // In the shape, relative to its middle.
+  Vec3 offset(const Dice& dice) const {
+    const double a = dice.draw(Draw::placeA), b = dice.draw(Draw::placeA, 1), c = dice.draw(Draw::placeA, 2);
+    const Vec3 extent = vec(emitter_.extent);
+    switch (static_cast<EmitterShape>(emitter_.shape)) {
+      case EmitterShape::point:
+        return {0, 0, 0};
+      case EmitterShape::sphere: {
+        const double hollow = extent[1] * extent[1] * extent[1];
+        const double r = extent[0] * cubeRoot(hollow + (1 - hollow) * c);
+        const Vec3 d = coneDirection(-1, a, b);
+        return {d[0] * r, d[1] * r, d[2] * r};
+      }
+      case EmitterShape::box:
+        return {extent[0] * (2 * a - 1), extent[1] * (2 * b - 1), extent[2] * (2 * c - 1)};
+    }
+    return {0, 0, 0};
+  }
+
+  Vec3 startVelocity(const Dice& dice, double born) const {
+    const Vec3 cone = coneDirection(static_cast<double>(emitter_.spreadCosine), dice.draw(Draw::directionA),
+                                    dice.draw(Draw::directionB));
+    Vec3 start = around(vec(emitter_.direction), cone);
+    const double speed = dice.between(Draw::speed, emitter_.speed);
+    const Vec3 own = velocity(born);
+    for (std::size_t i = 0; i < 3; ++i)
+      start[i] = start[i] * speed + own[i] * static_cast<double>(emitter_.inheritance);
+    return start;
+  }
+
+  Quaternion rotation(const Dice& dice, double share, const Vec3& speed) const {
+    double turns = row(emitter_.rotationRow, share, 0);
+    if ((emitter_.flags & kEmitterRandomStart) != 0) turns += dice.draw(Draw::angle);
+    if ((emitter_.flags & kEmitterAlign) != 0) return product(alongVelocity(speed), turned({1, 0, 0}, turns));
+    Vec3 axis = vec(emitter_.axis);
+    if (axis == Vec3{0, 0, 0}) axis = coneDirection(-1, dice.draw(Draw::axisA), dice.draw(Draw::axisB));
+    return turned(axis, turns);
+  }
+
+  std::uint32_t map(const Dice& dice, double age) const {
+    if (emitter_.firstMap == kNoMap || emitter_.mapCount <= 1) return emitter_.firstMap;
+    const double count = emitter_.mapCount;
+    const double at = dice.draw(Draw::map) * count + age * static_cast<double>(emitter_.mapsPerSecond);
+    return emitter_.firstMap + static_cast<std::uint32_t>(at - std::floor(at / count) * count) % emitter_.mapCount;
+  }
+
+  Particle particle(const Dice& dice, double born, double age, double lifetime) const {
+    const double share = age / lifetime;
+    const Vec3 start = startVelocity(dice, born);
+    const Vec3 from = place(born), shift = offset(dice);
+    const double drag = static_cast<double>(emitter_.drag);
+    const double mean = decayMean(drag * age), slope = decayMeanSlope(drag * age), left = decay(drag * age);
+    Vec3 speed{};
+    Particle result{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double pull = static_cast<double>(emitter_.gravity[i]) + drag * static_cast<double>(emitter_.wind[i]);
+      speed[i] = start[i] * left + pull * age * mean;
+      result.center[i] = static_cast<float>(from[i] + shift[i] + start[i] * age * mean + pull * age * age * slope);
+    }
+    const Quaternion turn = rotation(dice, share, speed);
+    for (std::size_t i = 0; i < 4; ++i) result.rotation[i] = static_cast<float>(turn[i]);
+    fillLook(dice, share, result);
+    result.map = map(dice, age);
+    return result;
+  }
+
+  void fillLook(const Dice& dice, double share, Particle& result) const {
+    const double radius = dice.between(Draw::radius, emitter_.radius) * row(emitter_.radiusRow, share, 1);
+    const double opacity = row(emitter_.opacityRow, share, 1);
+    result.radius = static_cast<float>(std::max(0.0, radius));
+    result.extinction = static_cast<float>(static_cast<double>(emitter_.extinction) * std::max(0.0, opacity));
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      result.shape[i] = emitter_.proportions[i] * result.radius;
+      const std::uint32_t diffuse = emitter_.diffuseRow == kNoRow ? kNoRow : emitter_.diffuseRow + i;
+      const std::uint32_t emission = emitter_.emissionRow == kNoRow ? kNoRow : emitter_.emissionRow + i;
+      const double albedo = static_cast<double>(emitter_.diffuse[i]) * row(diffuse, share, 1);
+      const double glow = static_cast<double>(emitter_.emission[i]) * row(emission, share, 1);
+      result.diffuse[i] = static_cast<float>(std::clamp(albedo, 0.0, 1.0));
+      result.emission[i] = static_cast<float>(std::max(0.0, glow));
+    }
+    const double taken = static_cast<double>(emitter_.displacement) * row(emitter_.displacementRow, share, 1);
+    result.displacement = std::clamp(static_cast<float>(taken), 0.0f, 0.95f);
+    result.age = static_cast<float>(share);
+    result.kind = emitter_.kind;
+    result.material = emitter_.material;
+    result.seed = dice.seed();
+  }
+
+  const EffectTables& tables_;
+  const EmitterRecord& emitter_;
+  std::span<const SpawnSpan> spans_;
+  double duration_;
+  std::uint32_t seed_;
+  std::uint32_t number_;
+  double time_;
+};
+
+// At most so many of a span's particles are born in [from, to].
+std::uint64_t bornWithin(const SpawnSpan& span, double from, double to) {
+  const double begin = static_cast<double>(span.begin), end = static_cast<double>(span.end);
+  const double overlap = std::min(end, to) - std::max(begin, from);
+  if (overlap < 0) return 0;
+  if (!(end > begin)) return span.count;
+  const double share = overlap / (end - begin) * span.count;
+  return std::min<std::uint64_t>(span.count, static_cast<std::uint64_t>(share) + 2);
+}
+
+}  // namespace
+
+float sampleCurve(const CurveRow& row, float x) {
+  const float at = std::clamp(x, 0.0f, 1.0f) * static_cast<float>(kCurveSamples - 1);
+  const std::size_t index = std::min<std::size_t>(static_cast<std::size_t>(at), kCurveSamples - 2);
+  return row.values[index] + (row.values[index + 1] - row.values[index]) * (at - static_cast<float>(index));
+}
+
+// The number born within a window changes its slope only where the window's ends meet those of a span, so it is largest
+// with the window's end at one of these.
+std::uint64_t mostAlive(const EmitterRecord& emitter, std::span<const SpawnSpan> spans, float duration, bool loop) {
+  constexpr double kSlack = 1e-6;  // seconds; far above what rounding may move
+  const double life = static_cast<double>(emitter.lifetime[1]), period = static_cast<double>(duration);
+  const double runs = loop ? std::floor(life / period) : 0;
+  const double window = life - runs * period;
+  std::uint64_t total = 0, most = 0;
+  const auto count = [&](double end) {
+    std::uint64_t born = 0;
+    for (const SpawnSpan& span : spans) {
+      born += bornWithin(span, end - window - kSlack, end + kSlack);
+      if (loop) born += bornWithin(span, end - window - kSlack + period, end + kSlack + period);
+    }
+    most = std::max(most, born);
+  };
+  for (const SpawnSpan& span : spans) {
+    total += span.count;
+    for (const float edge : {span.begin, span.end}) {
+      const double at = static_cast<double>(edge);
+      count(at);
+      count(loop && at + window > period ? at + window - period : at + window);
+    }
+  }
+  return most + total * static_cast<std::uint64_t>(runs);
+}
+
+std::uint64_t mostAlive(const EffectTables& tables, const EffectRecord& effect) {
+  std::uint64_t sum = 0;
+  for (std::uint32_t i = 0; i < effect.emitterCount; ++i) {
+    const EmitterRecord& emitter = tables.emitters[effect.firstEmitter + i];
+    const auto spans = std::span(tables.spans).subspan(emitter.firstSpan, emitter.spanCount);
+    sum += mostAlive(emitter, spans, effect.duration, (effect.flags & kEffectLoop) != 0);
+  }
+  return sum;
+}
+
+std::vector<Particle> particlesAt(const EffectTables& tables, std::uint32_t effect, double time) {
+  std::vector<Particle> particles;
+  if (!(time >= 0 && time <= kMaxEffectTime)) return particles;
+  const EffectRecord& record = tables.effects[effect];
+  const double duration = static_cast<double>(record.duration);
+  for (std::uint32_t e = 0; e < record.emitterCount; ++e) {
+    const EmitterRun run(tables, record, e, time);
+    std::int64_t first = 0, last = 0;
+    if ((record.flags & kEffectLoop) != 0) {
+      const double life = static_cast<double>(tables.emitters[record.firstEmitter + e].lifetime[1]);
+      first = static_cast<std::int64_t>(std::floor((time - life) / duration)) - 1;
+      last = static_cast<std::int64_t>(std::floor(time / duration));
+      if ((record.flags & kEffectPrewarm) == 0) first = std::max<std::int64_t>(first, 0);
+    }
+    for (std::int64_t cycle = first; cycle <= last; ++cycle) run.append(cycle, particles);
+  }
+  return particles;
+}
+
+}  // namespace billow::format
