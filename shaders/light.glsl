@@ -3,6 +3,7 @@
 #define BILLOW_LIGHT
 
 #include "medium.glsl"
+#include "phase.glsl"
 
 // Share of the sun's light that reaches p (world, relative to the eye), by marching towards the sun. The reference
 // mode; a cached light volume has this signature too.
@@ -24,18 +25,7 @@ float sunTransmittance(vec3 p) {
   return exp(-opticalDepth);
 }
 
-// Radiance scattered towards the eye per unit of scattering. Orders after the first are imitated by Wrenninge's sum
-// (Wrenninge, Kulla, Lundqvist 2013, "Oz: the great and volumetric"): each half as strong, half as attenuated and half
-// as directed as the one before.
-vec3 scatteredSun(vec3 p, float cosine) {
-  const float transmittance = sunTransmittance(p);
-  float strength = 1.0;
-  float sum = 0.0;
-  for (int order = 0; order < int(params.sunLight.w); ++order) {
-    sum += strength * henyeyGreenstein(params.sun.w * strength, cosine) * pow(transmittance, strength);
-    strength *= 0.5;
-  }
-  return params.sunLight.rgb * sum;
-}
+// Radiance scattered towards the eye per unit of scattering.
+vec3 scatteredSun(vec3 p, float cosine) { return params.sunLight.rgb * scatteredShare(sunTransmittance(p), cosine); }
 
 #endif

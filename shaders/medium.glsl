@@ -1,10 +1,8 @@
-// What a grid value means optically: extinction, emission and the phase function.
+// What a grid value means optically: extinction and emission.
 #ifndef BILLOW_MEDIUM
 #define BILLOW_MEDIUM
 
 #include "skip.glsl"
-
-const float kPi = 3.14159265;
 
 // The grid that extinction comes from: its own, or where there is none the temperature, or the flames.
 uint extinctionSlot() {
@@ -42,12 +40,6 @@ vec3 emissionOf(float temperature, float flames) {
   const float amount = burning ? flames : temperature * params.smoke.x;
   if (amount <= 0.0) return vec3(0.0);
   return params.emission.x * amount * blackbody(params.emission.z + params.emission.y * heat);
-}
-
-// Henyey and Greenstein (1941), normalised over the sphere; cosine between the light's way and the scattered way.
-float henyeyGreenstein(float g, float cosine) {
-  const float base = 1.0 + g * g - 2.0 * g * cosine;
-  return (1.0 - g * g) / (4.0 * kPi * base * sqrt(base));
 }
 
 #endif

@@ -1,5 +1,6 @@
 #include "billow/headless/headless.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -129,7 +130,7 @@ class HeadlessImpl final : public Headless {
     poolInfo.queueFamilyIndex = device_.host.drawFamily;
     auto queryInfo = begin<VkQueryPoolCreateInfo>(VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO);
     queryInfo.queryType = VK_QUERY_TYPE_TIMESTAMP;
-    queryInfo.queryCount = 2;
+    queryInfo.queryCount = runtime::kMetavoxelTimestamps;
     const VkDevice device = device_.host.device;
     if (device_.vk.vkCreateCommandPool(device, &poolInfo, nullptr, &pool_) != VK_SUCCESS ||
         device_.vk.vkCreateQueryPool(device, &queryInfo, nullptr, &queries_) != VK_SUCCESS) {
@@ -150,52 +151,39 @@ class HeadlessImpl final : public Headless {
   void waitIdle() override { device_.vk.vkDeviceWaitIdle(device_.host.device); }
 
   Result<Picture> render(runtime::Renderer& renderer, runtime::DrawInfo draw) override {
-    const std::size_t pixels = std::size_t{draw.width} * draw.height;
-    Target color(device_), depth(device_), readBack(device_);
-    if (auto done = makeImages(draw, color, depth); !done) return tl::unexpected(done.error());
-    if (auto done = readBack.makeBuffer(pixels * 20, VK_BUFFER_USAGE_TRANSFER_DST_BIT); !done) {
-      return tl::unexpected(done.error());
-    }
-    beginCommands();
-    toGeneral(color.image, depth.image);
-    if (auto done = renderer.record(commands_, draw); !done) return tl::unexpected(done.error());
-    barrier(VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT, VK_ACCESS_2_SHADER_WRITE_BIT, VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT,
-            VK_ACCESS_2_TRANSFER_READ_BIT);
-    copyImage(color.image, draw, readBack.buffer, 0);
-    copyImage(depth.image, draw, readBack.buffer, pixels * 16);
-    barrier(VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_2_HOST_BIT,
-            VK_ACCESS_2_HOST_READ_BIT);
-    if (auto done = submitAndWait(renderer, *draw.frame); !done) return tl::unexpected(done.error());
-    Picture picture{.width = draw.width, .height = draw.height, .rgba = {}, .depth = {}};
-    if (draw.colorFormat == runtime::ColorFormat::half) {
-      std::vector<std::uint16_t> halves(pixels * 4);
-      std::memcpy(halves.data(), readBack.mapped, halves.size() * 2);
-      for (const std::uint16_t half : halves) picture.rgba.push_back(halfToFloat(half));
-    } else {
-      picture.rgba.assign(readBack.mapped, readBack.mapped + pixels * 4);
-    }
-    picture.depth.assign(readBack.mapped + pixels * 4, readBack.mapped + pixels * 5);
-    return picture;
+    return drawPicture(renderer, draw, draw.frame->uploadValue(), [&] { return renderer.record(commands_, draw); });
+  }
+
+  Result<Picture> render(runtime::Renderer& renderer, runtime::Metavoxels& metavoxels,
+                         runtime::MetavoxelDraw draw) override {
+    return drawPicture(renderer, draw, uploadOf(draw), [&] { return metavoxels.record(commands_, draw); });
   }
 
   Result<std::vector<double>> time(runtime::Renderer& renderer, runtime::DrawInfo draw, std::uint32_t count) override {
-    Target color(device_), depth(device_);
-    if (auto done = makeImages(draw, color, depth); !done) return tl::unexpected(done.error());
     std::vector<double> milliseconds;
-    for (std::uint32_t i = 0; i < count; ++i) {
-      beginCommands();
-      toGeneral(color.image, depth.image);
-      device_.vk.vkCmdResetQueryPool(commands_, queries_, 0, 2);
-      device_.vk.vkCmdWriteTimestamp2(commands_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, queries_, 0);
-      if (auto done = renderer.record(commands_, draw); !done) return tl::unexpected(done.error());
-      device_.vk.vkCmdWriteTimestamp2(commands_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, queries_, 1);
-      if (auto done = submitAndWait(renderer, *draw.frame); !done) return tl::unexpected(done.error());
-      std::uint64_t ticks[2] = {};
-      device_.vk.vkGetQueryPoolResults(device_.host.device, queries_, 0, 2, sizeof(ticks), ticks, sizeof(ticks[0]),
-                                       VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT);
-      milliseconds.push_back(static_cast<double>(ticks[1] - ticks[0]) * double{device_.timestampPeriod} * 1e-6);
+    const auto record = [&]() -> Result<void> {
+      stamp(0);
+      if (auto done = renderer.record(commands_, draw); !done) return done;
+      stamp(1);
+      return {};
+    };
+    const auto take = [&] { milliseconds.push_back(passTimes(2)[0]); };
+    if (auto done = drawTimed(renderer, draw, draw.frame->uploadValue(), count, record, take); !done) {
+      return tl::unexpected(done.error());
     }
     return milliseconds;
+  }
+
+  Result<std::vector<PassTimes>> time(runtime::Renderer& renderer, runtime::Metavoxels& metavoxels,
+                                      runtime::MetavoxelDraw draw, std::uint32_t count) override {
+    std::vector<PassTimes> rows;
+    draw.timestamps = queries_;
+    const auto record = [&] { return metavoxels.record(commands_, draw); };
+    const auto take = [&] { rows.push_back(passTimes(runtime::kMetavoxelTimestamps)); };
+    if (auto done = drawTimed(renderer, draw, uploadOf(draw), count, record, take); !done) {
+      return tl::unexpected(done.error());
+    }
+    return rows;
   }
 
   Result<std::vector<float>> lookup(runtime::Renderer& renderer, const runtime::Frame& frame, std::uint32_t slot,
@@ -216,12 +204,84 @@ class HeadlessImpl final : public Headless {
     if (auto done = renderer.recordLookup(commands_, info); !done) return tl::unexpected(done.error());
     barrier(VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT, VK_ACCESS_2_SHADER_WRITE_BIT, VK_PIPELINE_STAGE_2_HOST_BIT,
             VK_ACCESS_2_HOST_READ_BIT);
-    if (auto done = submitAndWait(renderer, frame); !done) return tl::unexpected(done.error());
+    if (auto done = submitAndWait(renderer, frame.uploadValue()); !done) return tl::unexpected(done.error());
     return std::vector<float>(out.mapped, out.mapped + count);
   }
 
  private:
-  Result<void> makeImages(runtime::DrawInfo& draw, Target& color, Target& depth) {
+  static std::uint64_t uploadOf(const runtime::MetavoxelDraw& draw) {
+    std::uint64_t value = 0;
+    for (const runtime::MetavoxelVolume& volume : draw.volumes) value = std::max(value, volume.frame->uploadValue());
+    return value;
+  }
+
+  // Draws into images of the size and format that `draw` (DrawInfo or MetavoxelDraw) names; they are filled in.
+  template <class Draw, class Record>
+  Result<Picture> drawPicture(runtime::Renderer& renderer, Draw& draw, std::uint64_t uploadValue,
+                              const Record& record) {
+    const std::size_t pixels = std::size_t{draw.width} * draw.height;
+    Target color(device_), depth(device_), readBack(device_);
+    if (auto done = makeImages(draw, color, depth); !done) return tl::unexpected(done.error());
+    if (auto done = readBack.makeBuffer(pixels * 20, VK_BUFFER_USAGE_TRANSFER_DST_BIT); !done) {
+      return tl::unexpected(done.error());
+    }
+    beginCommands();
+    toGeneral(color.image, depth.image);
+    if (auto done = record(); !done) return tl::unexpected(done.error());
+    barrier(VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT, VK_ACCESS_2_SHADER_WRITE_BIT, VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT,
+            VK_ACCESS_2_TRANSFER_READ_BIT);
+    copyImage(color.image, draw.width, draw.height, readBack.buffer, 0);
+    copyImage(depth.image, draw.width, draw.height, readBack.buffer, pixels * 16);
+    barrier(VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_2_HOST_BIT,
+            VK_ACCESS_2_HOST_READ_BIT);
+    if (auto done = submitAndWait(renderer, uploadValue); !done) return tl::unexpected(done.error());
+    Picture picture{.width = draw.width, .height = draw.height, .rgba = {}, .depth = {}};
+    if (draw.colorFormat == runtime::ColorFormat::half) {
+      std::vector<std::uint16_t> halves(pixels * 4);
+      std::memcpy(halves.data(), readBack.mapped, halves.size() * 2);
+      for (const std::uint16_t half : halves) picture.rgba.push_back(halfToFloat(half));
+    } else {
+      picture.rgba.assign(readBack.mapped, readBack.mapped + pixels * 4);
+    }
+    picture.depth.assign(readBack.mapped + pixels * 4, readBack.mapped + pixels * 5);
+    return picture;
+  }
+
+  // Draws `count` times; `record` writes the timestamps and `take` reads them.
+  template <class Draw, class Record, class Take>
+  Result<void> drawTimed(runtime::Renderer& renderer, Draw& draw, std::uint64_t uploadValue, std::uint32_t count,
+                         const Record& record, const Take& take) {
+    Target color(device_), depth(device_);
+    if (auto done = makeImages(draw, color, depth); !done) return done;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      beginCommands();
+      toGeneral(color.image, depth.image);
+      device_.vk.vkCmdResetQueryPool(commands_, queries_, 0, runtime::kMetavoxelTimestamps);
+      if (auto done = record(); !done) return done;
+      if (auto done = submitAndWait(renderer, uploadValue); !done) return done;
+      take();
+    }
+    return {};
+  }
+
+  void stamp(std::uint32_t query) {
+    device_.vk.vkCmdWriteTimestamp2(commands_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, queries_, query);
+  }
+
+  // Milliseconds between the first `count` timestamps.
+  PassTimes passTimes(std::uint32_t count) {
+    std::array<std::uint64_t, runtime::kMetavoxelTimestamps> ticks{};
+    device_.vk.vkGetQueryPoolResults(device_.host.device, queries_, 0, count, sizeof(ticks), ticks.data(),
+                                     sizeof(ticks[0]), VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT);
+    PassTimes times{};
+    for (std::uint32_t i = 0; i + 1 < count; ++i) {
+      times[i] = static_cast<double>(ticks[i + 1] - ticks[i]) * double{device_.timestampPeriod} * 1e-6;
+    }
+    return times;
+  }
+
+  template <class Draw>
+  Result<void> makeImages(Draw& draw, Target& color, Target& depth) {
     const bool half = draw.colorFormat == runtime::ColorFormat::half;
     const VkFormat format = half ? VK_FORMAT_R16G16B16A16_SFLOAT : VK_FORMAT_R32G32B32A32_SFLOAT;
     if (auto done = color.makeImage(format, draw.width, draw.height); !done) return done;
@@ -270,21 +330,21 @@ class HeadlessImpl final : public Headless {
     device_.vk.vkCmdPipelineBarrier2(commands_, &info);
   }
 
-  void copyImage(VkImage image, const runtime::DrawInfo& draw, VkBuffer to, VkDeviceSize offset) {
+  void copyImage(VkImage image, std::uint32_t width, std::uint32_t height, VkBuffer to, VkDeviceSize offset) {
     VkBufferImageCopy copy{};
     copy.bufferOffset = offset;
     copy.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
-    copy.imageExtent = {draw.width, draw.height, 1};
+    copy.imageExtent = {width, height, 1};
     device_.vk.vkCmdCopyImageToBuffer(commands_, image, VK_IMAGE_LAYOUT_GENERAL, to, 1, &copy);
   }
 
-  Result<void> submitAndWait(const runtime::Renderer& renderer, const runtime::Frame& frame) {
+  Result<void> submitAndWait(const runtime::Renderer& renderer, std::uint64_t uploadValue) {
     device_.vk.vkEndCommandBuffer(commands_);
     auto commandInfo = begin<VkCommandBufferSubmitInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO);
     commandInfo.commandBuffer = commands_;
     auto wait = begin<VkSemaphoreSubmitInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO);
     wait.semaphore = renderer.uploadSemaphore();
-    wait.value = frame.uploadValue();
+    wait.value = uploadValue;
     wait.stageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT;
     auto info = begin<VkSubmitInfo2>(VK_STRUCTURE_TYPE_SUBMIT_INFO_2);
     info.waitSemaphoreInfoCount = 1;

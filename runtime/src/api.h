@@ -26,11 +26,15 @@ namespace billow::runtime {
   X(vkBindImageMemory)             \
   X(vkCmdBindDescriptorSets)       \
   X(vkCmdBindPipeline)             \
+  X(vkCmdClearColorImage)          \
   X(vkCmdCopyBuffer)               \
   X(vkCmdCopyBufferToImage)        \
   X(vkCmdDispatch)                 \
+  X(vkCmdDispatchIndirect)         \
+  X(vkCmdFillBuffer)               \
   X(vkCmdPipelineBarrier2)         \
   X(vkCmdPushConstants)            \
+  X(vkCmdWriteTimestamp2)          \
   X(vkCreateBuffer)                \
   X(vkCreateCommandPool)           \
   X(vkCreateComputePipelines)      \
@@ -39,6 +43,7 @@ namespace billow::runtime {
   X(vkCreateImage)                 \
   X(vkCreateImageView)             \
   X(vkCreatePipelineLayout)        \
+  X(vkCreateSampler)               \
   X(vkCreateSemaphore)             \
   X(vkCreateShaderModule)          \
   X(vkDestroyBuffer)               \
@@ -49,6 +54,7 @@ namespace billow::runtime {
   X(vkDestroyImageView)            \
   X(vkDestroyPipeline)             \
   X(vkDestroyPipelineLayout)       \
+  X(vkDestroySampler)              \
   X(vkDestroySemaphore)            \
   X(vkDestroyShaderModule)         \
   X(vkEndCommandBuffer)            \

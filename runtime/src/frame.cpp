@@ -116,7 +116,7 @@ Result<void> createObjects(Device& device, const StagedFrame& staged, FrameObjec
   frame.bufferBytes_ = staged.bufferBytes;
   frame.stats_.allocatedBytes = frame.buffer_.allocationSize();
   frame.shape_ = staged.shape;
-  auto image = Image3D::make(device, staged.shape.format(), staged.shape.extent());
+  auto image = Image::make(device, {.format = staged.shape.format(), .extent = staged.shape.extent()});
   if (!image) return tl::unexpected(image.error());
   frame.atlas_ = std::move(*image);
   frame.stats_.allocatedBytes += frame.atlas_.allocationSize();

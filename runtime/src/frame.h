@@ -42,7 +42,7 @@ class ResidentFrame final : public Frame {
   Buffer buffer_;
   std::uint64_t bufferBytes_ = 0;  // of it that are copied from staging
   VkDeviceAddress bricks_ = 0;     // where buffer_ begins
-  Image3D atlas_;
+  Image atlas_;
   AtlasShape shape_;
 };
 

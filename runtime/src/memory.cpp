@@ -113,12 +113,11 @@ VkDeviceAddress Buffer::address() const {
   return device_->api.vkGetBufferDeviceAddress(device_->host.device, &info);
 }
 
-Image3D& Image3D::operator=(Image3D&& other) noexcept {
+Image& Image::operator=(Image&& other) noexcept {
   if (this == &other) return *this;
   reset();
   device_ = std::exchange(other.device_, nullptr);
-  format_ = other.format_;
-  extent_ = other.extent_;
+  shape_ = other.shape_;
   image_ = std::exchange(other.image_, VK_NULL_HANDLE);
   view_ = std::exchange(other.view_, VK_NULL_HANDLE);
   memory_ = std::exchange(other.memory_, VK_NULL_HANDLE);
@@ -126,20 +125,19 @@ Image3D& Image3D::operator=(Image3D&& other) noexcept {
   return *this;
 }
 
-Result<Image3D> Image3D::make(Device& device, VkFormat format, VkExtent3D extent) {
-  Image3D image;
+Result<Image> Image::make(Device& device, const ImageShape& shape) {
+  Image image;
   image.device_ = &device;
-  image.format_ = format;
-  image.extent_ = extent;
+  image.shape_ = shape;
   auto info = begin<VkImageCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO);
-  info.imageType = VK_IMAGE_TYPE_3D;
-  info.format = format;
-  info.extent = extent;
+  info.imageType = shape.type;
+  info.format = shape.format;
+  info.extent = shape.extent;
   info.mipLevels = 1;
   info.arrayLayers = 1;
   info.samples = VK_SAMPLE_COUNT_1_BIT;
   info.tiling = VK_IMAGE_TILING_OPTIMAL;
-  info.usage = VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT;
+  info.usage = shape.usage;
   info.initialLayout = VK_IMAGE_LAYOUT_UNDEFINED;
   std::uint32_t families[2];
   shareFamilies(device, info, families);
@@ -149,7 +147,7 @@ Result<Image3D> Image3D::make(Device& device, VkFormat format, VkExtent3D extent
   return image;
 }
 
-Result<void> Image3D::bind() {
+Result<void> Image::bind() {
   const auto memory = allocate(*device_, requirements_, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, false);
   if (!memory) return tl::unexpected(memory.error());
   memory_ = *memory;
@@ -158,15 +156,15 @@ Result<void> Image3D::bind() {
   if (result != VK_SUCCESS) return vulkanError("vkBindImageMemory", result);
   auto info = begin<VkImageViewCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO);
   info.image = image_;
-  info.viewType = VK_IMAGE_VIEW_TYPE_3D;
-  info.format = format_;
+  info.viewType = shape_.type == VK_IMAGE_TYPE_3D ? VK_IMAGE_VIEW_TYPE_3D : VK_IMAGE_VIEW_TYPE_2D;
+  info.format = shape_.format;
   info.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
   result = device_->api.vkCreateImageView(device, &info, nullptr, &view_);
   if (result != VK_SUCCESS) return vulkanError("vkCreateImageView", result);
   return {};
 }
 
-void Image3D::reset() {
+void Image::reset() {
   if (device_ == nullptr) return;
   const VkDevice device = device_->host.device;
   if (view_ != VK_NULL_HANDLE) device_->api.vkDestroyImageView(device, view_, nullptr);

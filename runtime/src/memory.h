@@ -39,27 +39,33 @@ class Buffer {
   std::span<std::byte> mapped_;
 };
 
-class Image3D {
- public:
-  Image3D() = default;
-  Image3D(Image3D&& other) noexcept { *this = std::move(other); }
-  Image3D& operator=(Image3D&& other) noexcept;
-  ~Image3D() { reset(); }
+struct ImageShape {
+  VkFormat format = VK_FORMAT_UNDEFINED;
+  VkExtent3D extent{};
+  VkImageType type = VK_IMAGE_TYPE_3D;
+  VkImageUsageFlags usage = VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT;
+};
 
-  // Sampled and written by transfers; concurrent where the host's upload and draw families differ.
-  static Result<Image3D> make(Device& device, VkFormat format, VkExtent3D extent);
+class Image {
+ public:
+  Image() = default;
+  Image(Image&& other) noexcept { *this = std::move(other); }
+  Image& operator=(Image&& other) noexcept;
+  ~Image() { reset(); }
+
+  // One level, one layer; concurrent where the host's upload and draw families differ.
+  static Result<Image> make(Device& device, const ImageShape& shape);
   Result<void> bind();
   void reset();
 
   VkImage handle() const { return image_; }
   VkImageView view() const { return view_; }
-  VkExtent3D extent() const { return extent_; }
+  VkExtent3D extent() const { return shape_.extent; }
   std::uint64_t allocationSize() const { return requirements_.size; }
 
  private:
   Device* device_ = nullptr;
-  VkFormat format_ = VK_FORMAT_UNDEFINED;
-  VkExtent3D extent_{};
+  ImageShape shape_;
   VkImage image_ = VK_NULL_HANDLE;
   VkImageView view_ = VK_NULL_HANDLE;
   VkDeviceMemory memory_ = VK_NULL_HANDLE;

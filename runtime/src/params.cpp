@@ -17,20 +17,6 @@ std::array<float, 3> normalized(const std::array<float, 3>& v) {
   return {v[0] / length, v[1] / length, v[2] / length};
 }
 
-gpu::uvec4 addresses(VkDeviceAddress a, VkDeviceAddress b) {
-  const auto low = [](VkDeviceAddress x) { return static_cast<std::uint32_t>(x & 0xffffffffu); };
-  const auto high = [](VkDeviceAddress x) { return static_cast<std::uint32_t>(x >> 32); };
-  return {low(a), high(a), low(b), high(b)};
-}
-
-void addFrame(const ResidentFrame& frame, const std::array<double, 3>& eye, Filter widest, gpu::MarchParams& params) {
-  params.bricks = addresses(0, frame.bricks_);
-  params.bricks.x = frame.shape_.xBits | frame.shape_.yBits << 8;
-  for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
-    if (frame.grids_[slot].present) params.grids[slot] = gridParams(frame.grids_[slot], eye, widest);
-  }
-}
-
 void addView(const DrawInfo& draw, gpu::MarchParams& params) {
   const View& view = draw.view;
   const float halfHeight = view.tanHalfHeight;
@@ -54,6 +40,12 @@ void addLook(const DrawInfo& draw, gpu::MarchParams& params) {
 }
 
 }  // namespace
+
+gpu::uvec4 addresses(VkDeviceAddress a, VkDeviceAddress b) {
+  const auto low = [](VkDeviceAddress x) { return static_cast<std::uint32_t>(x & 0xffffffffu); };
+  const auto high = [](VkDeviceAddress x) { return static_cast<std::uint32_t>(x >> 32); };
+  return {low(a), high(a), low(b), high(b)};
+}
 
 gpu::GridParams gridParams(const ResidentGrid& grid, const std::array<double, 3>& eye, Filter widest) {
   double toIndex[12];
@@ -81,10 +73,23 @@ gpu::GridParams gridParams(const ResidentGrid& grid, const std::array<double, 3>
   return params;
 }
 
-gpu::MarchParams marchParams(const ResidentFrame& frame, const DrawInfo& draw) {
+void addFrame(const ResidentFrame& frame, const std::array<double, 3>& eye, Filter widest, gpu::MarchParams& params) {
+  params.bricks = addresses(0, frame.bricks_);
+  params.bricks.x = frame.shape_.xBits | frame.shape_.yBits << 8;
+  for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
+    if (frame.grids_[slot].present) params.grids[slot] = gridParams(frame.grids_[slot], eye, widest);
+  }
+}
+
+gpu::MarchParams viewParams(const DrawInfo& draw) {
   gpu::MarchParams params{};
   addView(draw, params);
   addLook(draw, params);
+  return params;
+}
+
+gpu::MarchParams marchParams(const ResidentFrame& frame, const DrawInfo& draw) {
+  gpu::MarchParams params = viewParams(draw);
   // One box serves both marches.
   const bool wide = draw.quality.filter == Filter::trilinear || draw.quality.shadows == Filter::trilinear;
   addFrame(frame, draw.view.eye, wide ? Filter::trilinear : Filter::nearest, params);

@@ -8,6 +8,10 @@ namespace billow::runtime {
 
 // `widest` is the filter that reaches farthest of those that will read the grid.
 gpu::GridParams gridParams(const ResidentGrid& grid, const std::array<double, 3>& eye, Filter widest);
+// View, sun, look and quality; no grids.
+gpu::MarchParams viewParams(const DrawInfo& draw);
+// Two addresses, each as low and high word.
+gpu::uvec4 addresses(VkDeviceAddress a, VkDeviceAddress b);
 gpu::MarchParams marchParams(const ResidentFrame& frame, const DrawInfo& draw);
 gpu::MarchParams lookupParams(const ResidentFrame& frame, Filter filter);
 

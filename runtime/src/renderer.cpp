@@ -1,13 +1,9 @@
 #include <algorithm>
-#include <cmath>
-#include <limits>
-#include <new>
-#include <stdexcept>
 #include <string>
-#include <system_error>
 #include <utility>
 
 #include "billow/runtime/runtime.h"
+#include "checks.h"
 #include "frame.h"
 #include "params.h"
 #include "passes.h"
@@ -41,72 +37,15 @@ Result<void> describeDevice(Device& device, BlockUse use) {
   return {};
 }
 
-bool finite(const std::array<float, 3>& v) {
-  return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
-}
-
-// Whether low <= each <= high; a NaN is not.
-bool within(const std::array<float, 3>& v, float low, float high) {
-  return std::all_of(v.begin(), v.end(), [&](float value) { return value >= low && value <= high; });
-}
-
-bool positive(float value) {
-  return std::isfinite(value) && value > 0;
-}
-
-// These name the first field that is outside of what runtime.h allows, or give null.
-const char* badView(const View& view) {
-  if (!std::all_of(view.eye.begin(), view.eye.end(), [](double at) { return std::isfinite(at); })) return "view.eye";
-  if (!finite(view.right) || !finite(view.up) || !finite(view.forward)) return "view.right, up, forward";
-  return positive(view.tanHalfHeight) ? nullptr : "view.tanHalfHeight";
-}
-
-const char* badLight(const DrawInfo& draw) {
-  const std::array<float, 3>& sun = draw.sun.direction;
-  if (!finite(sun) || sun == std::array<float, 3>{0, 0, 0}) return "sun.direction";
-  if (!within(draw.sun.irradiance, 0, std::numeric_limits<float>::max())) return "sun.irradiance";
-  if (!finite(draw.background.bottom) || !finite(draw.background.top)) return "background.bottom, top";
-  return draw.background.opacity >= 0 && draw.background.opacity <= 1 ? nullptr : "background.opacity";
-}
-
-const char* badLook(const Look& look) {
-  if (!within(look.albedo, 0, 1)) return "look.albedo";
-  if (!(std::abs(look.anisotropy) < 1)) return "look.anisotropy";
-  if (!finite(look.ambient)) return "look.ambient";
-  if (look.scatteringOrders < 1 || look.scatteringOrders > 8) return "look.scatteringOrders";
-  if (!positive(look.heatMax)) return "look.heatMax";
-  return positive(look.referenceKelvin) ? nullptr : "look.referenceKelvin";
-}
-
-const char* badQuality(const Quality& quality) {
-  const auto step = [](float voxels) { return std::isfinite(voxels) && voxels >= kLeastStep; };
-  if (!step(quality.step)) return "quality.step";
-  if (!step(quality.shadowStep) || quality.shadowSteps == 0) return "quality.shadowStep, shadowSteps";
-  return quality.filter == Filter::none ? "quality.filter" : nullptr;
-}
-
 const char* badField(const DrawInfo& draw) {
   if (draw.frame == nullptr) return "frame";
   if (draw.width == 0 || draw.height == 0) return "width, height";
   if (draw.color == VK_NULL_HANDLE || draw.depth == VK_NULL_HANDLE) return "color, depth";
-  for (const char* field : {badView(draw.view), badLight(draw), badLook(draw.look), badQuality(draw.quality)}) {
+  for (const char* field : {badView(draw.view), badSun(draw.sun), badBackground(draw.background), badLook(draw.look),
+                            badQuality(draw.quality)}) {
     if (field != nullptr) return field;
   }
   return nullptr;
-}
-
-// What work() returns, or ErrorCode::memory where the standard library threw.
-template <class T, class Work>
-Result<T> guarded(const Work& work) {
-  try {
-    return work();
-  } catch (const std::bad_alloc&) {
-    return tl::unexpected(Error{.code = ErrorCode::memory, .message = "out of memory"});
-  } catch (const std::length_error&) {
-    return tl::unexpected(Error{.code = ErrorCode::memory, .message = "out of memory"});
-  } catch (const std::system_error&) {
-    return tl::unexpected(Error{.code = ErrorCode::memory, .message = "system error"});
-  }
 }
 
 class RendererImpl final : public Renderer {
@@ -163,6 +102,7 @@ class RendererImpl final : public Renderer {
   std::uint64_t bytesInUse() const override { return device_.used; }
 
  private:
+  Device& device() override { return device_; }
   static std::string badMessage(const char* field) {
     return std::string("DrawInfo: ") + field + " is outside of its range";
   }

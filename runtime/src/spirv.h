@@ -8,6 +8,20 @@ namespace billow::runtime::spirv {
 using std::uint32_t;
 #include "march_half.spv.h"
 #include "march_single.spv.h"
+#include "metavoxel_bin.spv.h"
+#include "metavoxel_bin_volume.spv.h"
+#include "metavoxel_fill.spv.h"
+#include "metavoxel_fill_volume.spv.h"
+#include "metavoxel_finish_half.spv.h"
+#include "metavoxel_finish_single.spv.h"
+#include "metavoxel_light.spv.h"
+#include "metavoxel_march_half.spv.h"
+#include "metavoxel_march_single.spv.h"
+#include "metavoxel_plan.spv.h"
+#include "metavoxel_rank.spv.h"
+#include "metavoxel_reset.spv.h"
+#include "metavoxel_shadow.spv.h"
+#include "metavoxel_sum.spv.h"
 #include "voxels.spv.h"
 }  // namespace billow::runtime::spirv
 

@@ -6,7 +6,7 @@
 namespace billow::runtime {
 namespace {
 
-VkImageMemoryBarrier2 layoutBarrier(const Image3D& image, VkImageLayout from, VkImageLayout to) {
+VkImageMemoryBarrier2 layoutBarrier(const Image& image, VkImageLayout from, VkImageLayout to) {
   auto barrier = begin<VkImageMemoryBarrier2>(VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2);
   const bool first = from == VK_IMAGE_LAYOUT_UNDEFINED;
   barrier.srcStageMask = first ? VK_PIPELINE_STAGE_2_NONE : VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT;

@@ -3,6 +3,7 @@
 #ifndef BILLOW_HEADLESS_HEADLESS_H
 #define BILLOW_HEADLESS_HEADLESS_H
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -10,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "billow/runtime/metavoxel.h"
 #include "billow/runtime/runtime.h"
 
 namespace billow::headless {
@@ -28,6 +30,8 @@ struct Picture {
   std::vector<float> depth;  // one a pixel
 };
 
+using PassTimes = std::array<double, runtime::kMetavoxelTimestamps - 1>;
+
 class Headless {
  public:
   // Loads libvulkan at run time; its absence is an error, as is a machine without a device that fits.
@@ -45,6 +49,14 @@ class Headless {
   // Draws `count` times and returns each dispatch's GPU time in milliseconds.
   virtual Result<std::vector<double>> time(runtime::Renderer& renderer, runtime::DrawInfo draw,
                                            std::uint32_t count) = 0;
+
+  // The same with metavoxels of this renderer.
+  virtual Result<Picture> render(runtime::Renderer& renderer, runtime::Metavoxels& metavoxels,
+                                 runtime::MetavoxelDraw draw) = 0;
+
+  // Milliseconds between MetavoxelDraw::timestamps, one row a draw.
+  virtual Result<std::vector<PassTimes>> time(runtime::Renderer& renderer, runtime::Metavoxels& metavoxels,
+                                              runtime::MetavoxelDraw draw, std::uint32_t count) = 0;
 
   // One value per position (three floats each, pack index space) of the frame's grid in `slot`.
   virtual Result<std::vector<float>> lookup(runtime::Renderer& renderer, const runtime::Frame& frame,

@@ -25,6 +25,8 @@
 
 namespace billow::runtime {
 
+struct Device;  // the runtime's own
+
 enum class ErrorCode {
   pack,         // the pack breaks a rule or cannot be read
   budget,       // the frame does not fit into the budget; nothing was allocated
@@ -216,6 +218,10 @@ class Renderer {
 
   // All memory that billow holds now, in bytes. Staging memory is given back at the next upload() after its completion.
   virtual std::uint64_t bytesInUse() const = 0;
+
+ private:
+  friend class Metavoxels;  // metavoxel.h
+  virtual Device& device() = 0;
 };
 
 }  // namespace billow::runtime

@@ -1,0 +1,122 @@
+// Metavoxels: VDB volumes and procedural particles in one light-aligned space, where they shadow and occlude each
+// other.
+//
+//   auto metavoxels = billow::runtime::Metavoxels::create(*renderer, {.tables = &pack.effects()});
+//   (*metavoxels)->record(commandBuffer, {.view = view, .volumes = volumes, .particles = particles, ...});
+//
+// The space is a cube of metavoxels whose z axis runs along the sunlight. A metavoxel is a cube of voxels with a border
+// of one, so that filtering has no seam; only those in which something is exist. Each draw bins what it is given, fills
+// the metavoxels, propagates light through them column by column, and marches them. Where the pool of metavoxels is too
+// small for all, they are drawn in rounds, in an order that light and eye both allow, with the same picture.
+#ifndef BILLOW_RUNTIME_METAVOXEL_H
+#define BILLOW_RUNTIME_METAVOXEL_H
+
+#include <span>
+
+#include "billow/format/effect.h"
+#include "billow/runtime/runtime.h"
+
+namespace billow::runtime {
+
+struct MetavoxelConfig {
+  std::uint32_t edge = 32;        // texels along a metavoxel's edge, its border of one included; 4 to 64
+  std::uint32_t metavoxels = 32;  // along each axis of the space, 1 to 128; metavoxels * (edge - 2) <= 4096
+  // Bytes of all memory that this object allocates, within the Renderer's budget too. What is left after the lists is
+  // the pool: 12 bytes a texel. Too little for a 256th of maxMetavoxels is an error.
+  std::uint64_t memoryBudget = std::uint64_t{512} << 20;
+  std::uint32_t maxMetavoxels = 4096;       // occupied ones of a draw, 1 to 65535; further ones are left out
+  std::uint32_t maxParticles = 16384;       // of a draw, 0 to 1 048 576
+  std::uint32_t maxListEntries = 1u << 20;  // particles in metavoxels' lists, all together; further ones are left out
+  std::uint32_t maxVolumes = 4;             // of a draw, 0 to 8
+  std::uint32_t recordsInFlight = 3;        // record() calls whose commands may be pending at once, at least 1
+  // Materials, curves, ramps and maps of the particles; kept to the format's rules (those of an open pack are). Read by
+  // create() alone. Without them there are no particles.
+  const format::EffectTables* tables = nullptr;
+};
+
+struct MetavoxelVolume {
+  const Frame* frame = nullptr;  // of the Renderer
+  // Row-major 3x4, from the volume's own world to the scene's; invertible. Extinction and emission stay per unit of the
+  // scene's world.
+  std::array<double, 12> objectToWorld{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+  Look look = {};  // its anisotropy, ambient and scatteringOrders are not used: see Scattering
+};
+
+// How all matter of the space scatters: what shares a voxel shares this.
+struct Scattering {
+  float anisotropy = 0.5f;                          // in (-1, 1)
+  std::array<float, 3> ambient{0.3f, 0.35f, 0.4f};  // finite
+  std::uint32_t orders = 1;                         // as Look::scatteringOrders, 1 to 8
+};
+
+// What is left of sunlight behind a voxel of optical depth d: exp(-d), or 1 / (1 + d).
+enum class Attenuation { exponential, reciprocal };
+
+inline constexpr std::uint32_t kMetavoxelTimestamps = 6;
+
+struct MetavoxelDraw {
+  View view = {};
+  Sun sun = {};
+  Scattering scattering = {};
+  Attenuation attenuation = Attenuation::exponential;
+  // What red, green and blue sunlight lose, as multiples of the extinction, >= 0; {1, 1, 1} is white light.
+  std::array<float, 3> lightExtinction{1, 1, 1};
+  // Middle of the space. It is moved by up to half a voxel an axis, so that the centres of voxels lie at whole
+  // multiples of voxelSize along the space's axes from the world's origin: a space that follows a camera does not swim.
+  // The x and y axes are those of the world where the sun stands on an axis of the world.
+  std::array<double, 3> center{0, 0, 0};
+  float voxelSize = 0.1f;  // world units, > 0
+  std::span<const MetavoxelVolume> volumes = {};
+  std::span<const format::Particle> particles = {};  // those of radius 0 are not there
+  float step = 1;       // of the march, in voxels along the direction of view, >= kLeastStep
+  bool jitter = false;  // displace each pixel's steps by a fixed pattern: noise in place of bands
+  bool cull = true;     // leave out what neither the eye sees nor light passes on its way to what it may see
+  Background background = {};
+  std::uint32_t width = 0, height = 0;  // of all images
+  ColorFormat colorFormat = ColorFormat::half;
+  VkImageView color = VK_NULL_HANDLE;  // as DrawInfo has them
+  VkImageView depth = VK_NULL_HANDLE;
+  VkImageView sceneDepth = VK_NULL_HANDLE;  // optional storage image R32F: distance of the scene along `forward`
+  // Optional: kMetavoxelTimestamps queries of a timestamp pool, reset by the host, from firstTimestamp on: begin,
+  // binned, first round filled, lit and marched, end.
+  VkQueryPool timestamps = VK_NULL_HANDLE;
+  std::uint32_t firstTimestamp = 0;
+};
+
+// Of the last draw whose commands have been executed; all 0 before.
+struct MetavoxelStats {
+  std::uint32_t draw = 0;         // counts from 1
+  std::uint32_t occupied = 0;     // metavoxels in which something is, whether or not they were drawn
+  std::uint32_t drawn = 0;        // at most maxMetavoxels
+  std::uint32_t listEntries = 0;  // particles in lists, whether or not there was room
+};
+
+// The shadow that the space casts on the scene.
+struct MetavoxelShadow {
+  VkImageView view = VK_NULL_HANDLE;  // R32F in VK_IMAGE_LAYOUT_GENERAL: optical depth of the whole space, a texel a
+                                      // column of voxels; written anew by each draw
+  std::uint32_t size = 0;             // texels along both edges
+};
+
+// One space. Used from one thread at a time, destroyed before its Renderer and when no commands that use it are
+// pending.
+class Metavoxels {
+ public:
+  static Result<std::unique_ptr<Metavoxels>> create(Renderer& renderer, const MetavoxelConfig& config);
+  virtual ~Metavoxels() = default;
+
+  // Records all passes of a draw, for a queue that takes compute and transfers. A combination of grids and index that
+  // is met for the first time builds its pipelines here. barriers: images as Renderer::record() has them, sceneDepth
+  // readable in VK_IMAGE_LAYOUT_GENERAL; afterwards they were read and written by the compute shader stage. Draws of
+  // one object follow each other on one queue. The submission must wait for the uploadValue() of each volume's frame.
+  virtual Result<void> record(VkCommandBuffer commands, const MetavoxelDraw& draw) = 0;
+
+  virtual MetavoxelStats stats() const = 0;
+  virtual MetavoxelShadow shadow() const = 0;
+  virtual std::uint32_t poolSlots() const = 0;       // metavoxels that are resident at once
+  virtual std::uint64_t bytesAllocated() const = 0;  // never above memoryBudget
+};
+
+}  // namespace billow::runtime
+
+#endif  // BILLOW_RUNTIME_METAVOXEL_H

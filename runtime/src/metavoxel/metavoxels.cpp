@@ -1,0 +1,359 @@
+#include "billow/runtime/metavoxel.h"
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "checks.h"
+#include "params.h"
+#include "pipelines.h"
+#include "resources.h"
+#include "space.h"
+
+namespace billow::runtime {
+namespace {
+
+tl::unexpected<Error> badArgument(const std::string& what) {
+  return failure(ErrorCode::argument, "MetavoxelDraw: " + what + " is outside of its range");
+}
+
+Result<void> checkDraw(const MetavoxelDraw& draw, const MetavoxelConfig& config) {
+  if (draw.width == 0 || draw.height == 0) return badArgument("width, height");
+  if (draw.color == VK_NULL_HANDLE || draw.depth == VK_NULL_HANDLE) return badArgument("color, depth");
+  if (!positive(draw.voxelSize)) return badArgument("voxelSize");
+  if (!(std::isfinite(draw.step) && draw.step >= kLeastStep)) return badArgument("step");
+  for (const double at : draw.center) {
+    if (!std::isfinite(at)) return badArgument("center");
+  }
+  for (const float share : draw.lightExtinction) {
+    if (!(share >= 0) || !std::isfinite(share)) return badArgument("lightExtinction");
+  }
+  Look scattering;
+  scattering.anisotropy = draw.scattering.anisotropy;
+  scattering.ambient = draw.scattering.ambient;
+  scattering.scatteringOrders = draw.scattering.orders;
+  if (badLook(scattering) != nullptr) return badArgument("scattering");
+  for (const char* field : {badView(draw.view), badSun(draw.sun), badBackground(draw.background)}) {
+    if (field != nullptr) return badArgument(field);
+  }
+  if (draw.volumes.size() > config.maxVolumes) return badArgument("volumes: their number");
+  if (draw.particles.size() > config.maxParticles) return badArgument("particles: their number");
+  for (std::size_t i = 0; i < draw.volumes.size(); ++i) {
+    const std::string name = "volumes[" + std::to_string(i) + "].";
+    if (draw.volumes[i].frame == nullptr) return badArgument(name + "frame");
+    if (const char* field = badLook(draw.volumes[i].look)) return badArgument(name + field);
+  }
+  return {};
+}
+
+// The first field that a shader could not take, or null. Numbers that are merely odd draw something odd.
+const char* badParticle(const format::Particle& particle, std::size_t materials, std::size_t maps) {
+  if (!(std::isfinite(particle.radius) && particle.radius >= 0)) return "radius";
+  for (const float at : particle.center) {
+    if (!std::isfinite(at)) return "center";
+  }
+  if (particle.kind >= format::kKindCount) return "kind";
+  if (particle.material >= materials) return "material";
+  return particle.map != format::kNoMap && particle.map >= maps ? "map" : nullptr;
+}
+
+class MetavoxelsImpl final : public Metavoxels {
+ public:
+  MetavoxelsImpl(Device& device, const MetavoxelConfig& config)
+      : device_(device), config_(config), resources_(device), pipelines_(device, config) {
+    if (config.tables != nullptr) {
+      materials_ = config.tables->materials.size();
+      maps_ = config.tables->maps.size();
+    }
+    config_.tables = nullptr;
+  }
+
+  Result<void> initialise(const MetavoxelConfig& config) {
+    if (auto made = resources_.create(config); !made) return made;
+    return pipelines_.create();
+  }
+
+  Result<void> record(VkCommandBuffer commands, const MetavoxelDraw& draw) override {
+    return guarded<void>([&]() -> Result<void> {
+      if (auto fine = checkDraw(draw, config_); !fine) return fine;
+      auto steps = prepare(draw);
+      if (!steps) return tl::unexpected(steps.error());
+      if (auto written = write(draw, *steps); !written) return written;
+      recordAll(commands, draw, *steps);
+      next_ = (next_ + 1) % config_.recordsInFlight;
+      ++draws_;
+      return {};
+    });
+  }
+
+  MetavoxelStats stats() const override {
+    MetavoxelStats stats;
+    for (std::uint32_t i = 0; i < config_.recordsInFlight; ++i) {
+      gpu::MetavoxelCounters counters;
+      const std::size_t at = i * sizeof(counters);
+      std::memcpy(&counters, resources_.counters.mapped().subspan(at, sizeof(counters)).data(), sizeof(counters));
+      if (counters.boxMax.w <= stats.draw) continue;
+      stats = {.draw = counters.boxMax.w,
+               .occupied = counters.wanted.x,
+               .drawn = counters.wanted.z,
+               .listEntries = counters.wanted.y};
+    }
+    return stats;
+  }
+
+  MetavoxelShadow shadow() const override {
+    return {.view = resources_.shadow.view(), .size = resources_.sizes().shadowEdge()};
+  }
+  std::uint32_t poolSlots() const override { return resources_.sizes().slots(); }
+  std::uint64_t bytesAllocated() const override { return resources_.bytes(); }
+
+ private:
+  struct VolumeSteps {
+    std::optional<PlacedVolume> placed;
+    VkPipeline bin = VK_NULL_HANDLE, fill = VK_NULL_HANDLE;
+    bool drawn() const { return placed && placed->cells; }
+  };
+  struct Steps {  // a draw's pipelines and volumes, all made before anything is recorded
+    Space space;
+    std::vector<VolumeSteps> volumes;
+    VkPipeline reset, binCount, binWrite, plan, rank, fill, sum, light, shadow, march, finish;
+  };
+
+  Result<Steps> prepare(const MetavoxelDraw& draw) {
+    Steps steps{};
+    steps.space = spaceOf(draw, resources_.sizes());
+    const bool half = draw.colorFormat == ColorFormat::half;
+    using enum MetavoxelPass;
+    const std::pair<MetavoxelPass, VkPipeline*> wanted[] = {{reset, &steps.reset},
+                                                            {binCount, &steps.binCount},
+                                                            {binWrite, &steps.binWrite},
+                                                            {plan, &steps.plan},
+                                                            {rank, &steps.rank},
+                                                            {fill, &steps.fill},
+                                                            {sum, &steps.sum},
+                                                            {light, &steps.light},
+                                                            {MetavoxelPass::shadow, &steps.shadow},
+                                                            {half ? marchHalf : marchSingle, &steps.march},
+                                                            {half ? finishHalf : finishSingle, &steps.finish}};
+    for (const auto& [pass, place] : wanted) {
+      const auto made = pipelines_.pipeline(pass);
+      if (!made) return tl::unexpected(made.error());
+      *place = *made;
+    }
+    for (std::size_t i = 0; i < draw.volumes.size(); ++i) {
+      auto volume = prepareVolume(steps.space, draw, i);
+      if (!volume) return tl::unexpected(volume.error());
+      steps.volumes.push_back(*volume);
+    }
+    return steps;
+  }
+
+  Result<VolumeSteps> prepareVolume(const Space& space, const MetavoxelDraw& draw, std::size_t number) {
+    const auto& frame = static_cast<const ResidentFrame&>(*draw.volumes[number].frame);
+    VolumeSteps steps;
+    if (frame.empty()) return steps;
+    steps.placed = placeVolume(space, draw, draw.volumes[number]);
+    if (!steps.placed) return badArgument("volumes[" + std::to_string(number) + "].objectToWorld");
+    const auto bin = pipelines_.pipeline(MetavoxelPass::binVolume, frame.indices());
+    if (!bin) return tl::unexpected(bin.error());
+    const auto fill = pipelines_.pipeline(MetavoxelPass::fillVolume, frame.indices());
+    if (!fill) return tl::unexpected(fill.error());
+    steps.bin = *bin;
+    steps.fill = *fill;
+    return steps;
+  }
+
+  // What the host writes for a draw: parameters and particles.
+  Result<void> write(const MetavoxelDraw& draw, const Steps& steps) {
+    const MetavoxelUpload upload = resources_.uploadOf(next_);
+    if (auto written = writeParticles(draw, steps.space, upload.particles); !written) return written;
+    put(upload.view, viewOf(draw));
+    for (std::size_t i = 0; i < steps.volumes.size(); ++i) {
+      if (steps.volumes[i].drawn()) put(upload.volumes + i * kMarchStride, steps.volumes[i].placed->params);
+    }
+    gpu::MetavoxelParams params = paramsOf(steps.space, draw, config_, resources_.sizes(), draws_ + 1);
+    const MetavoxelRegions& r = resources_.sizes().regions;
+    const auto both = [&](std::uint64_t a, std::uint64_t b) {
+      return addresses(resources_.address(a), resources_.address(b));
+    };
+    params.cells = both(r.words, r.positions);
+    params.items = both(r.found, r.cellAt);
+    params.lists = both(r.lists, r.cursors);
+    params.entries = both(r.entries, r.particles);
+    params.texels = both(r.emission, r.columns);
+    params.tables = both(r.materials, r.curves);
+    params.ramps = both(r.ramps, r.counters);
+    params.rounds = both(r.rounds, r.rounds);
+    put(upload.space, params);
+    pipelines_.write(resources_, next_, draw);
+    return {};
+  }
+
+  template <class T>
+  void put(std::uint64_t at, const T& value) {
+    std::memcpy(resources_.uploads.mapped().subspan(at, sizeof(T)).data(), &value, sizeof(T));
+  }
+
+  Result<void> writeParticles(const MetavoxelDraw& draw, const Space& space, std::uint64_t at) {
+    for (std::size_t i = 0; i < draw.particles.size(); ++i) {
+      format::Particle particle = draw.particles[i];
+      if (const char* field = badParticle(particle, materials_, maps_)) {
+        return badArgument("particles[" + std::to_string(i) + "]." + field);
+      }
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        particle.center[axis] = static_cast<float>(double{particle.center[axis]} - space.center[axis]);
+      }
+      put(at + i * sizeof(particle), particle);
+    }
+    return {};
+  }
+
+  void recordAll(VkCommandBuffer commands, const MetavoxelDraw& draw, const Steps& steps) {
+    const std::uint32_t rounds = resources_.sizes().rounds;
+    stamp(commands, draw, 0);
+    recordBegin(commands, draw, steps);
+    recordBin(commands, draw, steps);
+    stamp(commands, draw, 1);
+    for (std::uint32_t round = 0; round < rounds; ++round) recordRound(commands, draw, steps, round, rounds);
+    if (rounds > 1) {
+      dispatch(commands, steps.finish, {}, {(draw.width + 7) / 8, (draw.height + 7) / 8, 1});
+    }
+    const MetavoxelRegions& regions = resources_.sizes().regions;
+    const std::uint64_t size = sizeof(gpu::MetavoxelCounters);
+    const VkBufferCopy copy{regions.counters, next_ * size, size};
+    device_.api.vkCmdCopyBuffer(commands, resources_.arrays.handle(), resources_.counters.handle(), 1, &copy);
+    stamp(commands, draw, 5);
+  }
+
+  void recordBegin(VkCommandBuffer commands, const MetavoxelDraw& draw, const Steps& steps) {
+    const MetavoxelRegions& regions = resources_.sizes().regions;
+    const VkBuffer arrays = resources_.arrays.handle();
+    barrier(commands);  // after the draw before
+    if (draws_ == 0) {
+      resources_.recordFirst(commands);
+      barrier(commands);
+    }
+    pipelines_.bindView(commands, next_);
+    indirect(commands, steps.reset, {}, regions.counters + offsetof(gpu::MetavoxelCounters, reset));
+    barrier(commands);
+    device_.api.vkCmdFillBuffer(commands, arrays, regions.counters, sizeof(gpu::MetavoxelCounters), 0);
+    const VkClearColorValue none{};
+    const VkImageSubresourceRange whole{VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+    device_.api.vkCmdClearColorImage(commands, resources_.shadow.handle(), VK_IMAGE_LAYOUT_GENERAL, &none, 1, &whole);
+    if (!draw.particles.empty()) {
+      const VkBufferCopy copy{resources_.uploadOf(next_).particles, regions.particles, draw.particles.size_bytes()};
+      device_.api.vkCmdCopyBuffer(commands, resources_.uploads.handle(), arrays, 1, &copy);
+    }
+    barrier(commands);
+  }
+
+  void recordBin(VkCommandBuffer commands, const MetavoxelDraw& draw, const Steps& steps) {
+    const auto particles = static_cast<std::uint32_t>(draw.particles.size());
+    const std::uint64_t rank = resources_.sizes().regions.counters + offsetof(gpu::MetavoxelCounters, rank);
+    if (particles != 0) dispatch(commands, steps.binCount, {}, {particles, 1, 1});
+    for (std::uint32_t i = 0; i < steps.volumes.size(); ++i) {
+      const VolumeSteps& volume = steps.volumes[i];
+      if (!volume.drawn()) continue;
+      const auto& first = volume.placed->cells->first;
+      pipelines_.bindVolume(commands, next_, i);
+      dispatch(commands, volume.bin, {.volume = i, .box = {first[0], first[1], first[2], 0}},
+               volume.placed->cells->count);
+    }
+    pipelines_.bindView(commands, next_);
+    barrier(commands);
+    dispatch(commands, steps.plan, {}, {1, 1, 1});
+    barrier(commands);
+    indirect(commands, steps.rank, {}, rank);
+    barrier(commands);
+    if (particles != 0) dispatch(commands, steps.binWrite, {}, {particles, 1, 1});
+    barrier(commands);
+  }
+
+  void recordRound(VkCommandBuffer commands, const MetavoxelDraw& draw, const Steps& steps, std::uint32_t round,
+                   std::uint32_t rounds) {
+    const std::uint64_t at = resources_.sizes().regions.rounds + round * sizeof(gpu::MetavoxelRound);
+    const std::uint64_t fill = at + offsetof(gpu::MetavoxelRound, fill);
+    const std::uint64_t columns = at + offsetof(gpu::MetavoxelRound, columns);
+    PassPush push{.round = round, .finish = rounds == 1 ? 1u : 0u};
+    for (std::uint32_t i = 0; i < steps.volumes.size(); ++i) {
+      if (!steps.volumes[i].drawn()) continue;
+      pipelines_.bindVolume(commands, next_, i);
+      push.volume = i;
+      indirect(commands, steps.volumes[i].fill, push, fill);
+      barrier(commands);
+    }
+    pipelines_.bindView(commands, next_);
+    indirect(commands, steps.fill, push, fill);
+    barrier(commands);
+    if (round == 0) stamp(commands, draw, 2);
+    indirect(commands, steps.sum, push, columns);
+    barrier(commands);
+    indirect(commands, steps.light, push, columns);
+    barrier(commands);
+    if (round == 0) stamp(commands, draw, 3);
+    indirect(commands, steps.march, push, at + offsetof(gpu::MetavoxelRound, march));
+    indirect(commands, steps.shadow, push, columns);
+    barrier(commands);
+    if (round == 0) stamp(commands, draw, 4);
+  }
+
+  void dispatch(VkCommandBuffer commands, VkPipeline pipeline, const PassPush& push,
+                const std::array<std::uint32_t, 3>& groups) {
+    device_.api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
+    pipelines_.push(commands, push);
+    device_.api.vkCmdDispatch(commands, groups[0], groups[1], groups[2]);
+  }
+
+  void indirect(VkCommandBuffer commands, VkPipeline pipeline, const PassPush& push, std::uint64_t offset) {
+    device_.api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
+    pipelines_.push(commands, push);
+    device_.api.vkCmdDispatchIndirect(commands, resources_.arrays.handle(), offset);
+  }
+
+  // All that was written is there for all that follows.
+  void barrier(VkCommandBuffer commands) {
+    auto memory = begin<VkMemoryBarrier2>(VK_STRUCTURE_TYPE_MEMORY_BARRIER_2);
+    memory.srcStageMask = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT |
+                          VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT;
+    memory.srcAccessMask = VK_ACCESS_2_SHADER_WRITE_BIT | VK_ACCESS_2_TRANSFER_WRITE_BIT;
+    memory.dstStageMask = memory.srcStageMask;
+    memory.dstAccessMask = VK_ACCESS_2_SHADER_READ_BIT | VK_ACCESS_2_SHADER_WRITE_BIT | VK_ACCESS_2_TRANSFER_READ_BIT |
+                           VK_ACCESS_2_TRANSFER_WRITE_BIT | VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT;
+    auto info = begin<VkDependencyInfo>(VK_STRUCTURE_TYPE_DEPENDENCY_INFO);
+    info.memoryBarrierCount = 1;
+    info.pMemoryBarriers = &memory;
+    device_.api.vkCmdPipelineBarrier2(commands, &info);
+  }
+
+  void stamp(VkCommandBuffer commands, const MetavoxelDraw& draw, std::uint32_t number) {
+    if (draw.timestamps == VK_NULL_HANDLE) return;
+    device_.api.vkCmdWriteTimestamp2(commands, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, draw.timestamps,
+                                     draw.firstTimestamp + number);
+  }
+
+  Device& device_;
+  MetavoxelConfig config_;
+  std::size_t materials_ = 0, maps_ = 0;
+  MetavoxelResources resources_;
+  MetavoxelPipelines pipelines_;
+  std::uint32_t next_ = 0;   // of the draws in flight
+  std::uint32_t draws_ = 0;  // recorded so far
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Metavoxels>> Metavoxels::create(Renderer& renderer, const MetavoxelConfig& config) {
+  if (const char* field = badConfig(config)) {
+    return failure(ErrorCode::argument, std::string("MetavoxelConfig: ") + field + " is outside of its range");
+  }
+  Device& device = renderer.device();
+  return guarded<std::unique_ptr<Metavoxels>>([&]() -> Result<std::unique_ptr<Metavoxels>> {
+    auto metavoxels = std::make_unique<MetavoxelsImpl>(device, config);
+    if (auto ready = metavoxels->initialise(config); !ready) return tl::unexpected(ready.error());
+    return std::unique_ptr<Metavoxels>(std::move(metavoxels));
+  });
+}
+
+}  // namespace billow::runtime

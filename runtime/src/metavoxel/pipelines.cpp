@@ -1,0 +1,214 @@
+#include "pipelines.h"
+
+#include <algorithm>
+#include <span>
+
+#include "passes.h"
+#include "spirv.h"
+
+namespace billow::runtime {
+namespace {
+
+using Code = std::span<const std::uint32_t>;
+
+// In the order of MetavoxelPass.
+Code codeOf(MetavoxelPass pass) {
+  static const Code codes[] = {
+      spirv::kMetavoxelReset,       spirv::kMetavoxelBin,        spirv::kMetavoxelBin,
+      spirv::kMetavoxelBinVolume,   spirv::kMetavoxelPlan,       spirv::kMetavoxelRank,
+      spirv::kMetavoxelFill,        spirv::kMetavoxelFillVolume, spirv::kMetavoxelSum,
+      spirv::kMetavoxelLight,       spirv::kMetavoxelShadow,     spirv::kMetavoxelMarchHalf,
+      spirv::kMetavoxelMarchSingle, spirv::kMetavoxelFinishHalf, spirv::kMetavoxelFinishSingle};
+  return codes[static_cast<std::size_t>(pass)];
+}
+
+// Bindings of shaders/metavoxel*.glsl, set 1.
+enum SpaceBinding : std::uint32_t { params, poolTexels, poolFiltered, cubes, shadow, color, depth, sceneDepth, kCount };
+
+VkDescriptorType typeOf(std::uint32_t binding) {
+  if (binding == params) return VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
+  const bool filtered = binding == poolFiltered || binding == cubes;
+  return filtered ? VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER : VK_DESCRIPTOR_TYPE_STORAGE_IMAGE;
+}
+
+VkWriteDescriptorSet writeOf(VkDescriptorSet set, std::uint32_t binding, VkDescriptorType type,
+                             const VkDescriptorBufferInfo* buffer, const VkDescriptorImageInfo* image) {
+  auto write = begin<VkWriteDescriptorSet>(VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET);
+  write.dstSet = set;
+  write.dstBinding = binding;
+  write.descriptorCount = 1;
+  write.descriptorType = type;
+  write.pBufferInfo = buffer;
+  write.pImageInfo = image;
+  return write;
+}
+
+VkDescriptorSetLayoutBinding computeBinding(std::uint32_t binding, VkDescriptorType type) {
+  return {binding, type, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
+}
+
+}  // namespace
+
+MetavoxelPipelines::~MetavoxelPipelines() {
+  const VkDevice device = device_.host.device;
+  for (const auto& [key, pipeline] : pipelines_) device_.api.vkDestroyPipeline(device, pipeline, nullptr);
+  if (pool_ != VK_NULL_HANDLE) device_.api.vkDestroyDescriptorPool(device, pool_, nullptr);
+  if (layout_ != VK_NULL_HANDLE) device_.api.vkDestroyPipelineLayout(device, layout_, nullptr);
+  for (const VkDescriptorSetLayout layout : {matterLayout_, spaceLayout_}) {
+    if (layout != VK_NULL_HANDLE) device_.api.vkDestroyDescriptorSetLayout(device, layout, nullptr);
+  }
+}
+
+Result<void> MetavoxelPipelines::create() {
+  if (auto made = createLayouts(); !made) return made;
+  return createSets();
+}
+
+Result<void> MetavoxelPipelines::createLayouts() {
+  const VkDescriptorSetLayoutBinding matter[] = {computeBinding(0, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER),
+                                                 computeBinding(1, VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE)};
+  VkDescriptorSetLayoutBinding space[kCount];
+  for (std::uint32_t i = 0; i < kCount; ++i) space[i] = computeBinding(i, typeOf(i));
+  auto setInfo = begin<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
+  setInfo.bindingCount = 2;
+  setInfo.pBindings = matter;
+  VkResult result = device_.api.vkCreateDescriptorSetLayout(device_.host.device, &setInfo, nullptr, &matterLayout_);
+  if (result != VK_SUCCESS) return vulkanError("vkCreateDescriptorSetLayout", result);
+  setInfo.bindingCount = kCount;
+  setInfo.pBindings = space;
+  result = device_.api.vkCreateDescriptorSetLayout(device_.host.device, &setInfo, nullptr, &spaceLayout_);
+  if (result != VK_SUCCESS) return vulkanError("vkCreateDescriptorSetLayout", result);
+  const VkDescriptorSetLayout layouts[] = {matterLayout_, spaceLayout_};
+  const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(PassPush)};
+  auto info = begin<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
+  info.setLayoutCount = 2;
+  info.pSetLayouts = layouts;
+  info.pushConstantRangeCount = 1;
+  info.pPushConstantRanges = &range;
+  result = device_.api.vkCreatePipelineLayout(device_.host.device, &info, nullptr, &layout_);
+  if (result != VK_SUCCESS) return vulkanError("vkCreatePipelineLayout", result);
+  return {};
+}
+
+Result<void> MetavoxelPipelines::createSets() {
+  const std::uint32_t matters = inFlight_ * (volumes_ + 1);
+  const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, matters + inFlight_},
+                                        {VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE, matters},
+                                        {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 2 * inFlight_},
+                                        {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, kCount * inFlight_}};
+  auto poolInfo = begin<VkDescriptorPoolCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO);
+  poolInfo.maxSets = matters + inFlight_;
+  poolInfo.poolSizeCount = 4;
+  poolInfo.pPoolSizes = sizes;
+  VkResult result = device_.api.vkCreateDescriptorPool(device_.host.device, &poolInfo, nullptr, &pool_);
+  if (result != VK_SUCCESS) return vulkanError("vkCreateDescriptorPool", result);
+  const auto allocate = [&](VkDescriptorSetLayout layout, std::uint32_t count, std::vector<VkDescriptorSet>& sets) {
+    const std::vector<VkDescriptorSetLayout> layouts(count, layout);
+    sets.resize(count);
+    auto info = begin<VkDescriptorSetAllocateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO);
+    info.descriptorPool = pool_;
+    info.descriptorSetCount = count;
+    info.pSetLayouts = layouts.data();
+    result = device_.api.vkAllocateDescriptorSets(device_.host.device, &info, sets.data());
+    return result == VK_SUCCESS;
+  };
+  if (!allocate(matterLayout_, matters, matter_) || !allocate(spaceLayout_, inFlight_, space_)) {
+    return vulkanError("vkAllocateDescriptorSets", result);
+  }
+  return {};
+}
+
+Result<VkPipeline> MetavoxelPipelines::pipeline(MetavoxelPass pass, const FrameIndices& indices) {
+  const PassKey grids = passKey(indices, Shader::voxels, Filter::trilinear, Filter::none);
+  const Key key{pass, grids.index, grids.grids};
+  // The place first, so that no pipeline is lost where there is no memory for it.
+  VkPipeline& place = pipelines_[key];
+  if (place != VK_NULL_HANDLE) return place;
+  auto made = compile(key);
+  if (made) place = *made;
+  return made;
+}
+
+Result<VkPipeline> MetavoxelPipelines::compile(const Key& key) {
+  const auto [pass, index, grids] = key;
+  const VkDevice device = device_.host.device;
+  const Code code = codeOf(pass);
+  auto moduleInfo = begin<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
+  moduleInfo.codeSize = code.size_bytes();
+  moduleInfo.pCode = code.data();
+  VkShaderModule module = VK_NULL_HANDLE;
+  VkResult result = device_.api.vkCreateShaderModule(device, &moduleInfo, nullptr, &module);
+  if (result != VK_SUCCESS) return vulkanError("vkCreateShaderModule", result);
+  const std::uint32_t constants[] = {index, gpu::kFilterTrilinear, gpu::kFilterNone, grids,
+                                     pass == MetavoxelPass::binWrite ? 1u : 0u};
+  const VkSpecializationMapEntry entries[] = {{0, 0, 4}, {1, 4, 4}, {2, 8, 4}, {3, 12, 4}, {4, 16, 4}};
+  const VkSpecializationInfo specialization{5, entries, sizeof(constants), constants};
+  auto info = begin<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
+  info.stage = begin<VkPipelineShaderStageCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO);
+  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
+  info.stage.module = module;
+  info.stage.pName = "main";
+  info.stage.pSpecializationInfo = &specialization;
+  info.layout = layout_;
+  VkPipeline pipeline = VK_NULL_HANDLE;
+  result = device_.api.vkCreateComputePipelines(device, device_.host.pipelineCache, 1, &info, nullptr, &pipeline);
+  device_.api.vkDestroyShaderModule(device, module, nullptr);
+  if (result != VK_SUCCESS) return vulkanError("vkCreateComputePipelines", result);
+  return pipeline;
+}
+
+void MetavoxelPipelines::write(const MetavoxelResources& resources, std::uint32_t inFlight, const MetavoxelDraw& draw) {
+  const MetavoxelUpload upload = resources.uploadOf(inFlight);
+  const VkBuffer uploads = resources.uploads.handle();
+  const VkDescriptorBufferInfo spaceParams{uploads, upload.space, sizeof(gpu::MetavoxelParams)};
+  // Where the host has no depth of the scene, any image of its kind is bound, and not read.
+  const VkImageView scene = draw.sceneDepth != VK_NULL_HANDLE ? draw.sceneDepth : draw.depth;
+  const VkImageView views[kCount] = {VK_NULL_HANDLE,
+                                     resources.pool.view(),
+                                     resources.pool.view(),
+                                     resources.cubes.view(),
+                                     resources.shadow.view(),
+                                     draw.color,
+                                     draw.depth,
+                                     scene};
+  VkDescriptorImageInfo images[kCount];
+  VkWriteDescriptorSet writes[kCount];
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    images[i] = {resources.sampler, views[i],
+                 i == cubes ? VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL : VK_IMAGE_LAYOUT_GENERAL};
+    writes[i] = writeOf(space_[inFlight], i, typeOf(i), &spaceParams, &images[i]);
+  }
+  device_.api.vkUpdateDescriptorSets(device_.host.device, kCount, writes, 0, nullptr);
+  for (std::uint32_t i = 0; i <= draw.volumes.size(); ++i) {
+    const VkDescriptorBufferInfo params{uploads, upload.view + i * kMarchStride, sizeof(gpu::MarchParams)};
+    // The view has no atlas; the pool is an image of its kind.
+    VkDescriptorImageInfo atlas{VK_NULL_HANDLE, resources.pool.view(), VK_IMAGE_LAYOUT_GENERAL};
+    if (i > 0) {
+      atlas.imageView = static_cast<const ResidentFrame&>(*draw.volumes[i - 1].frame).atlas_.view();
+      atlas.imageLayout = VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL;
+    }
+    const VkDescriptorSet set = matter(inFlight, i);
+    const VkWriteDescriptorSet both[] = {writeOf(set, 0, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, &params, nullptr),
+                                         writeOf(set, 1, VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE, nullptr, &atlas)};
+    device_.api.vkUpdateDescriptorSets(device_.host.device, 2, both, 0, nullptr);
+  }
+}
+
+void MetavoxelPipelines::bind(VkCommandBuffer commands, VkDescriptorSet first, VkDescriptorSet second) const {
+  const VkDescriptorSet sets[] = {first, second};
+  device_.api.vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout_, 0, 2, sets, 0, nullptr);
+}
+
+void MetavoxelPipelines::bindView(VkCommandBuffer commands, std::uint32_t inFlight) const {
+  bind(commands, matter_[inFlight * (volumes_ + 1)], space_[inFlight]);
+}
+
+void MetavoxelPipelines::bindVolume(VkCommandBuffer commands, std::uint32_t inFlight, std::uint32_t volume) const {
+  bind(commands, matter_[inFlight * (volumes_ + 1) + volume + 1], space_[inFlight]);
+}
+
+void MetavoxelPipelines::push(VkCommandBuffer commands, const PassPush& push) const {
+  device_.api.vkCmdPushConstants(commands, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(push), &push);
+}
+
+}  // namespace billow::runtime

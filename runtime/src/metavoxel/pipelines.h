@@ -1,0 +1,80 @@
+// Pipelines and descriptor sets of the metavoxel passes.
+#ifndef BILLOW_RUNTIME_METAVOXEL_PIPELINES_H
+#define BILLOW_RUNTIME_METAVOXEL_PIPELINES_H
+
+#include <map>
+#include <tuple>
+
+#include "frame.h"
+#include "resources.h"
+
+namespace billow::runtime {
+
+enum class MetavoxelPass : std::uint32_t {
+  reset,
+  binCount,
+  binWrite,
+  binVolume,
+  plan,
+  rank,
+  fill,
+  fillVolume,
+  sum,
+  light,
+  shadow,
+  marchHalf,
+  marchSingle,
+  finishHalf,
+  finishSingle,
+};
+
+// Push constants, as shaders/metavoxel.glsl has them.
+struct PassPush {
+  std::uint32_t round = 0, volume = 0, finish = 0, reserved = 0;
+  std::uint32_t box[4] = {0, 0, 0, 0};
+};
+
+class MetavoxelPipelines {
+ public:
+  MetavoxelPipelines(Device& device, const MetavoxelConfig& config)
+      : device_(device), inFlight_(config.recordsInFlight), volumes_(config.maxVolumes) {}
+  MetavoxelPipelines(const MetavoxelPipelines&) = delete;
+  MetavoxelPipelines& operator=(const MetavoxelPipelines&) = delete;
+  ~MetavoxelPipelines();
+
+  Result<void> create();
+  // The passes of one volume are made for the grids and indices of its frame; others have none.
+  Result<VkPipeline> pipeline(MetavoxelPass pass, const FrameIndices& indices = {});
+
+  // Writes the sets of one draw in flight.
+  void write(const MetavoxelResources& resources, std::uint32_t inFlight, const MetavoxelDraw& draw);
+  // Binds a draw's space and its view, or one of its volumes.
+  void bindView(VkCommandBuffer commands, std::uint32_t inFlight) const;
+  void bindVolume(VkCommandBuffer commands, std::uint32_t inFlight, std::uint32_t volume) const;
+  void push(VkCommandBuffer commands, const PassPush& push) const;
+
+ private:
+  using Key = std::tuple<MetavoxelPass, std::uint32_t, std::uint32_t>;  // pass, index kind, grids
+  Result<void> createLayouts();
+  Result<void> createSets();
+  Result<VkPipeline> compile(const Key& key);
+  void bind(VkCommandBuffer commands, VkDescriptorSet first, VkDescriptorSet second) const;
+  VkDescriptorSet& matter(std::uint32_t inFlight, std::uint32_t number) {
+    return matter_[inFlight * (volumes_ + 1) + number];
+  }
+
+  Device& device_;
+  std::uint32_t inFlight_;
+  std::uint32_t volumes_;
+  VkDescriptorSetLayout matterLayout_ = VK_NULL_HANDLE;  // MarchParams and a volume's atlas
+  VkDescriptorSetLayout spaceLayout_ = VK_NULL_HANDLE;   // MetavoxelParams and all images
+  VkPipelineLayout layout_ = VK_NULL_HANDLE;
+  VkDescriptorPool pool_ = VK_NULL_HANDLE;
+  std::vector<VkDescriptorSet> matter_;  // a draw in flight: the view's, then one a volume
+  std::vector<VkDescriptorSet> space_;   // one a draw in flight
+  std::map<Key, VkPipeline> pipelines_;
+};
+
+}  // namespace billow::runtime
+
+#endif  // BILLOW_RUNTIME_METAVOXEL_PIPELINES_H

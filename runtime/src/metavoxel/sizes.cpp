@@ -1,0 +1,83 @@
+#include "sizes.h"
+
+#include <algorithm>
+
+namespace billow::runtime {
+namespace {
+
+constexpr std::uint64_t kAlign = 256;
+
+template <class Rows>
+std::uint64_t bytesOf(const Rows& rows) {
+  return rows.size() * sizeof(rows[0]);
+}
+
+// Slots as an image's box: rows of eight, layers of eight rows. Never more than asked for.
+void shapeSlots(std::uint64_t slots, std::uint32_t maxImageExtent3D, MetavoxelSizes& sizes) {
+  const std::uint64_t along = std::max<std::uint64_t>(maxImageExtent3D / sizes.edge, 1);
+  const auto part = [&](std::uint64_t wanted, std::uint64_t most) {
+    return static_cast<std::uint32_t>(std::clamp<std::uint64_t>(wanted, 1, std::min(most, along)));
+  };
+  sizes.slotsX = part(slots, 8);
+  sizes.slotsY = part(slots / sizes.slotsX, 8);
+  sizes.slotsZ = part(slots / (std::uint64_t{sizes.slotsX} * sizes.slotsY), along);
+}
+
+MetavoxelRegions regionsOf(const MetavoxelConfig& config, const MetavoxelSizes& sizes) {
+  std::uint64_t end = 0;
+  const auto region = [&](std::uint64_t bytes) {
+    const std::uint64_t at = end;
+    end += (std::max<std::uint64_t>(bytes, 1) + kAlign - 1) / kAlign * kAlign;
+    return at;
+  };
+  const format::EffectTables none;
+  const format::EffectTables& tables = config.tables != nullptr ? *config.tables : none;
+  const std::uint64_t most = sizes.most;
+  MetavoxelRegions regions{};
+  regions.counters = region(sizeof(gpu::MetavoxelCounters));
+  regions.rounds = region(sizes.rounds * sizeof(gpu::MetavoxelRound));
+  regions.words = region(sizes.cells() * 4);
+  regions.positions = region(sizes.cells() * 4);
+  regions.found = region(most * 4);
+  regions.cellAt = region(most * 4);
+  regions.lists = region(most * 8);
+  regions.cursors = region(most * 4);
+  regions.entries = region(std::uint64_t{config.maxListEntries} * 4);
+  regions.particles = region(std::uint64_t{config.maxParticles} * sizeof(format::Particle));
+  regions.materials = region(bytesOf(tables.materials));
+  regions.curves = region(bytesOf(tables.curves));
+  regions.ramps = region(bytesOf(tables.ramps));
+  regions.columns = region(most * sizes.inner * sizes.inner * 4);
+  regions.emission = region(std::uint64_t{sizes.slots()} * sizes.edge * sizes.edge * sizes.edge * 4);
+  regions.bytes = end;
+  return regions;
+}
+
+}  // namespace
+
+const char* badConfig(const MetavoxelConfig& config) {
+  if (config.edge < 4 || config.edge > 64) return "edge";
+  if (config.metavoxels < 1 || config.metavoxels > 128) return "metavoxels";
+  if (config.metavoxels * (config.edge - 2) > 4096) return "metavoxels * (edge - 2)";
+  if (config.maxMetavoxels < 1 || config.maxMetavoxels > 65535) return "maxMetavoxels";
+  if (config.maxParticles > 1048576) return "maxParticles";
+  if (config.maxVolumes > gpu::kMaxVolumes) return "maxVolumes";
+  return config.recordsInFlight == 0 ? "recordsInFlight" : nullptr;
+}
+
+MetavoxelSizes metavoxelSizes(const MetavoxelConfig& config, std::uint64_t slots, std::uint32_t maxImageExtent3D) {
+  MetavoxelSizes sizes{};
+  sizes.edge = config.edge;
+  sizes.inner = config.edge - 2;
+  sizes.axis = config.metavoxels;
+  sizes.most = static_cast<std::uint32_t>(std::min<std::uint64_t>(config.maxMetavoxels, sizes.cells()));
+  shapeSlots(slots, maxImageExtent3D, sizes);
+  // The cells before the eye and those after it each begin a round of their own.
+  sizes.rounds = sizes.slots() >= sizes.most ? 1 : (sizes.most + sizes.slots() - 1) / sizes.slots() + 1;
+  const std::size_t maps = config.tables != nullptr ? config.tables->maps.size() : 0;
+  sizes.cubeLayers = std::max(static_cast<std::uint32_t>(maps) * gpu::kCubeLayers, 1u);
+  sizes.regions = regionsOf(config, sizes);
+  return sizes;
+}
+
+}  // namespace billow::runtime

@@ -1,0 +1,42 @@
+// How large everything of a Metavoxels is: all of it is known when it is made.
+#ifndef BILLOW_RUNTIME_METAVOXEL_SIZES_H
+#define BILLOW_RUNTIME_METAVOXEL_SIZES_H
+
+#include "api.h"
+#include "billow/runtime/metavoxel.h"
+#include "metavoxel_interface.h"
+
+namespace billow::runtime {
+
+inline constexpr std::uint32_t kMostRounds = 256;
+inline constexpr std::uint64_t kTexelBytes = 12;  // 8 of the pool's image, 4 of emission
+
+// Where the arrays of metavoxel_interface.h begin in the device's buffer.
+struct MetavoxelRegions {
+  std::uint64_t counters, rounds, words, positions, found, cellAt, lists, cursors, entries, particles, materials,
+      curves, ramps, columns, emission;
+  std::uint64_t bytes;
+};
+
+struct MetavoxelSizes {
+  std::uint32_t edge, inner, axis;  // texels, voxels, cells
+  std::uint32_t slotsX, slotsY, slotsZ;
+  std::uint32_t most;  // occupied cells
+  std::uint32_t rounds;
+  std::uint32_t cubeLayers;  // of the image of cube maps, at least 1
+  MetavoxelRegions regions;
+
+  std::uint32_t slots() const { return slotsX * slotsY * slotsZ; }
+  std::uint64_t cells() const { return std::uint64_t{axis} * axis * axis; }
+  std::uint32_t shadowEdge() const { return axis * inner; }
+};
+
+// The first field outside of its range, or null.
+const char* badConfig(const MetavoxelConfig& config);
+
+// With a pool of at most so many slots. `slots` is at least 1.
+MetavoxelSizes metavoxelSizes(const MetavoxelConfig& config, std::uint64_t slots, std::uint32_t maxImageExtent3D);
+
+}  // namespace billow::runtime
+
+#endif  // BILLOW_RUNTIME_METAVOXEL_SIZES_H

@@ -1,0 +1,194 @@
+#include "space.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "billow/format/affine.h"
+#include "params.h"
+
+namespace billow::runtime {
+namespace {
+
+double dot(const Vec3d& a, const Vec3d& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+Vec3d cross(const Vec3d& a, const Vec3d& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+Vec3d scaled(const Vec3d& v, double factor) {
+  return {v[0] * factor, v[1] * factor, v[2] * factor};
+}
+
+Vec3d unit(const Vec3d& v) {
+  return scaled(v, 1 / std::sqrt(dot(v, v)));
+}
+
+Vec3d minus(const Vec3d& a, const Vec3d& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+
+Vec3d toDouble(const std::array<float, 3>& v) {
+  return {double{v[0]}, double{v[1]}, double{v[2]}};
+}
+
+gpu::vec4 vec4(const Vec3d& v, double w) {
+  return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2]), static_cast<float>(w)};
+}
+
+// The axis of the world that is most nearly perpendicular to z, made so.
+Vec3d perpendicular(const Vec3d& z) {
+  std::size_t least = 0;
+  for (std::size_t i = 1; i < 3; ++i) {
+    if (std::abs(z[i]) < std::abs(z[least])) least = i;
+  }
+  Vec3d x{0, 0, 0};
+  x[least] = 1;
+  return unit(minus(x, scaled(z, dot(x, z))));
+}
+
+// Index to the scene's world.
+void compose(const std::array<double, 12>& outer, const double (&inner)[12], double (&product)[12]) {
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 4; ++column) {
+      double sum = column == 3 ? outer[row * 4 + 3] : 0;
+      for (std::size_t i = 0; i < 3; ++i) sum += outer[row * 4 + i] * inner[i * 4 + column];
+      product[row * 4 + column] = sum;
+    }
+  }
+}
+
+// Widens [low, high] (voxels of the space) by what a grid's active voxels reach.
+void addReach(const Space& space, const format::GridFrame& frame, Vec3d& low, Vec3d& high) {
+  for (int corner = 0; corner < 8; ++corner) {
+    double at[3];
+    for (int i = 0; i < 3; ++i) at[i] = (corner >> i & 1) != 0 ? frame.activeMax[i] + 1.0 : frame.activeMin[i] - 1.0;
+    Vec3d world{};
+    for (std::size_t row = 0; row < 3; ++row) {
+      const double* m = frame.indexToWorld + row * 4;
+      world[row] = m[0] * at[0] + m[1] * at[1] + m[2] * at[2] + m[3];
+    }
+    const Vec3d from = minus(world, space.center);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double voxel = dot(space.axes[i], from) / space.voxel + space.half;
+      low[i] = std::min(low[i], voxel);
+      high[i] = std::max(high[i], voxel);
+    }
+  }
+}
+
+std::optional<CellRange> cellsOf(const Space& space, const Vec3d& low, const Vec3d& high) {
+  CellRange range{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double last = space.axis - 1.0;
+    // A cell reads half a voxel beyond its edge, and rounding may move that.
+    const double first = std::floor((low[i] - 1) / space.inner), end = std::floor((high[i] + 1) / space.inner);
+    if (!(first <= last) || !(end >= 0)) return std::nullopt;
+    range.first[i] = static_cast<std::uint32_t>(std::max(first, 0.0));
+    range.count[i] = static_cast<std::uint32_t>(std::min(end, last)) - range.first[i] + 1;
+  }
+  return range;
+}
+
+DrawInfo drawInfoOf(const MetavoxelDraw& draw, Look look) {
+  look.anisotropy = draw.scattering.anisotropy;
+  look.ambient = draw.scattering.ambient;
+  look.scatteringOrders = draw.scattering.orders;
+  DrawInfo info;
+  info.view = draw.view;
+  info.sun = draw.sun;
+  info.look = look;
+  info.quality.step = draw.step;
+  info.quality.jitter = draw.jitter;
+  info.background = draw.background;
+  info.width = draw.width;
+  info.height = draw.height;
+  return info;
+}
+
+void addPlanes(const Space& space, const MetavoxelDraw& draw, gpu::MetavoxelParams& params) {
+  const Vec3d forward = toDouble(draw.view.forward), right = toDouble(draw.view.right), up = toDouble(draw.view.up);
+  const double tanHeight = double{draw.view.tanHalfHeight};
+  const double tanWidth = tanHeight * draw.width / draw.height;
+  const Vec3d none{0, 0, 0};
+  const Vec3d wide = scaled(forward, tanWidth), high = scaled(forward, tanHeight);
+  const Vec3d inward[gpu::kPlanes] = {forward, minus(wide, minus(none, right)), minus(wide, right),
+                                      minus(high, minus(none, up)), minus(high, up)};
+  const Vec3d eye = minus(draw.view.eye, space.center);
+  for (std::size_t i = 0; i < gpu::kPlanes; ++i) {
+    Vec3d plane{};
+    double offset = -dot(inward[i], eye);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      plane[axis] = dot(inward[i], space.axes[axis]) * space.voxel;
+      offset -= plane[axis] * space.half;
+    }
+    params.planes[i] = vec4(plane, offset);
+  }
+}
+
+}  // namespace
+
+Space spaceOf(const MetavoxelDraw& draw, const MetavoxelSizes& sizes) {
+  Space space{};
+  const Vec3d z = unit(scaled(toDouble(draw.sun.direction), -1));
+  const Vec3d x = perpendicular(z);
+  space.axes = {x, cross(z, x), z};
+  space.voxel = double{draw.voxelSize};
+  space.axis = sizes.axis;
+  space.inner = sizes.inner;
+  space.half = 0.5 * sizes.axis * sizes.inner;
+  for (const Vec3d& axis : space.axes) {
+    // Voxel k has its centre at middle - half + k + 1/2.
+    const double shift = space.half - 0.5;
+    const double middle = std::round(dot(axis, draw.center) / space.voxel - shift) + shift;
+    for (std::size_t i = 0; i < 3; ++i) space.center[i] += axis[i] * middle * space.voxel;
+  }
+  return space;
+}
+
+std::optional<PlacedVolume> placeVolume(const Space& space, const MetavoxelDraw& draw, const MetavoxelVolume& volume) {
+  const auto& frame = static_cast<const ResidentFrame&>(*volume.frame);
+  PlacedVolume placed{.params = viewParams(drawInfoOf(draw, volume.look)), .cells = std::nullopt};
+  placed.params.bricks = addresses(0, frame.bricks_);
+  placed.params.bricks.x = frame.shape_.xBits | frame.shape_.yBits << 8;
+  constexpr double kFar = 1e300;
+  Vec3d low{kFar, kFar, kFar}, high{-kFar, -kFar, -kFar};
+  for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
+    if (!frame.grids_[slot].present) continue;
+    ResidentGrid grid = frame.grids_[slot];
+    compose(volume.objectToWorld, frame.grids_[slot].frame.indexToWorld, grid.frame.indexToWorld);
+    if (!format::invertible(grid.frame.indexToWorld)) return std::nullopt;
+    placed.params.grids[slot] = gridParams(grid, space.center, Filter::trilinear);
+    addReach(space, grid.frame, low, high);
+  }
+  placed.cells = cellsOf(space, low, high);
+  return placed;
+}
+
+gpu::MarchParams viewOf(const MetavoxelDraw& draw) {
+  return viewParams(drawInfoOf(draw, {}));
+}
+
+gpu::MetavoxelParams paramsOf(const Space& space, const MetavoxelDraw& draw, const MetavoxelConfig& config,
+                              const MetavoxelSizes& sizes, std::uint32_t number) {
+  gpu::MetavoxelParams params{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    params.toVoxel[i] = vec4(scaled(space.axes[i], 1 / space.voxel), space.half);
+    params.toWorld[i] = vec4(scaled(space.axes[i], space.voxel), space.half);
+  }
+  params.eye = vec4(minus(draw.view.eye, space.center), space.voxel);
+  addPlanes(space, draw, params);
+  params.tint = vec4(toDouble(draw.lightExtinction), 0);
+  const std::uint32_t flags = (draw.cull ? gpu::kFlagCull : 0) |
+                              (draw.attenuation == Attenuation::reciprocal ? gpu::kFlagReciprocal : 0) |
+                              (draw.sceneDepth != VK_NULL_HANDLE ? gpu::kFlagSceneDepth : 0);
+  params.space = {sizes.axis, sizes.edge, sizes.inner, flags};
+  params.pool = {sizes.slotsX, sizes.slotsY, sizes.slots(), sizes.most};
+  params.limits = {static_cast<std::uint32_t>(draw.particles.size()), config.maxListEntries,
+                   static_cast<std::uint32_t>(draw.volumes.size()), sizes.rounds};
+  params.picture = {(draw.width + 7) / 8, (draw.height + 7) / 8, number, 0};
+  return params;
+}
+
+}  // namespace billow::runtime

@@ -1,0 +1,49 @@
+// Columns of texels along the light: what a thread of the light's passes has, and where its light came from.
+#ifndef BILLOW_METAVOXEL_COLUMN
+#define BILLOW_METAVOXEL_COLUMN
+
+#include "metavoxel_pool.glsl"
+
+struct Column {
+  uint slot;
+  uint position;
+  uvec3 cell;
+  uvec2 texel;
+};
+
+Column columnOf() {
+  const uint blocks = (edgeTexels() + kSubBlock - 1u) / kSubBlock;
+  Column column;
+  column.slot = gl_WorkGroupID.y;
+  column.position = Rounds(meta.rounds.xy).items[pass.round].range.x + column.slot;
+  column.cell = cellOf(cellAt(column.position));
+  column.texel = uvec2(gl_WorkGroupID.x % blocks, gl_WorkGroupID.x / blocks) * kSubBlock + gl_LocalInvocationID.xy;
+  return column;
+}
+
+bool insideColumn(uvec2 texel) {
+  return all(greaterThanEqual(texel, uvec2(1u))) && all(lessThanEqual(texel, uvec2(innerVoxels())));
+}
+
+// Of the inner column `voxel` (texel - 1) of the metavoxel at a position.
+uint columnNumber(uint position, uvec2 voxel) {
+  return (position * innerVoxels() + voxel.y) * innerVoxels() + voxel.x;
+}
+
+// Optical depth between the light and a cell's layer, along the column of voxels that a texel lies in. A border's column
+// is an inner one of the next cell, and has its light.
+float depthAbove(uvec3 cell, uvec2 texel) {
+  const uint inner = innerVoxels();
+  const uvec2 voxel = cell.xy * inner + texel - 1u;  // in the space; at its lower edge far beyond the upper
+  if (any(greaterThanEqual(voxel, uvec2(cellsAxis() * inner)))) return 0.0;
+  const uvec2 owner = voxel / inner;
+  const uvec2 at = voxel - owner * inner;
+  float depth = 0.0;
+  for (uint z = ~Counters(meta.ramps.zw).value.boxMin.z; z < cell.z; ++z) {
+    const uint position = positionOf(uvec3(owner, z));
+    if (position != kNone) depth += Floats(meta.texels.zw).items[columnNumber(position, at)];
+  }
+  return depth;
+}
+
+#endif

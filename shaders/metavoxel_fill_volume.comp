@@ -1,0 +1,71 @@
+// One volume into the metavoxels of a round: a workgroup a block of 8^3 texels, two texels a thread.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+#extension GL_EXT_samplerless_texture_functions : require
+
+#include "medium.glsl"
+#include "metavoxel_block.glsl"
+
+layout(local_size_x = 8, local_size_y = 8, local_size_z = 4) in;
+
+const int kMostSamples = 4;  // an axis
+
+
+vec3 indexAlong(uint g, vec3 way) {
+  return vec3(dot(params.grids[g].toIndex[0].xyz, way), dot(params.grids[g].toIndex[1].xyz, way),
+              dot(params.grids[g].toIndex[2].xyz, way));
+}
+
+// Samples along an axis: a voxel of the space that spans several of the grid's takes their mean.
+int samplesAlong(vec3 step) { return clamp(int(ceil(length(step) - 0.25)), 1, kMostSamples); }
+
+Texel sampleVolume(vec3 voxel) {
+  const vec3 world = worldOf(voxel);
+  ivec3 count = ivec3(1);
+  for (uint g = 0u; g < kGridSlots; ++g) {
+    if (!hasGrid(g)) continue;
+    for (int axis = 0; axis < 3; ++axis) {
+      count[axis] = max(count[axis], samplesAlong(indexAlong(g, meta.toWorld[axis].xyz)));
+    }
+  }
+  float extinction = 0.0;
+  vec3 emission = vec3(0.0);
+  for (int i = 0; i < count.x * count.y * count.z; ++i) {
+    const ivec3 at = ivec3(i % count.x, i / count.x % count.y, i / (count.x * count.y));
+    const vec3 shift = (vec3(at) + 0.5) / vec3(count) - 0.5;
+    const vec3 place =
+        world + meta.toWorld[0].xyz * shift.x + meta.toWorld[1].xyz * shift.y + meta.toWorld[2].xyz * shift.z;
+    float value[3];
+    for (uint g = 0u; g < kGridSlots; ++g) {
+      const vec3 offset =
+          vec3(params.grids[g].toIndex[0].w, params.grids[g].toIndex[1].w, params.grids[g].toIndex[2].w);
+      value[g] = hasGrid(g) ? sampleGrid(g, indexAlong(g, place) + offset, kFilterTrilinear) : 0.0;
+    }
+    extinction += extinctionOf(value[extinctionSlot()]);
+    if (hasGrid(kTemperatureSlot) || hasGrid(kFlamesSlot)) {
+      emission += emissionOf(value[kTemperatureSlot], value[kFlamesSlot]);
+    }
+  }
+  const float share = meta.eye.w / float(count.x * count.y * count.z);
+  return Texel(params.albedo.rgb, extinction * share, emission * share);
+}
+
+void main() {
+  const Block block = blockOf();
+  const uint volumes = wordOf(block.number) >> kVolumeBit;
+  if ((volumes >> pass.volume & 1u) == 0u) return;
+  const bool first = (volumes & ((1u << pass.volume) - 1u)) == 0u;
+  for (uint i = 0u; i < 2u; ++i) {
+    const uvec3 texel = block.texel + uvec3(gl_LocalInvocationID.xy, gl_LocalInvocationID.z + 4u * i);
+    if (any(greaterThanEqual(texel, uvec3(edgeTexels())))) continue;
+    Texel sum = sampleVolume(texelVoxel(block.cell, texel));
+    if (!(sum.extinction > 0.0)) sum.albedo = vec3(0.0);
+    if (!first) {
+      const Texel old = loadTexel(block.slot, texel);
+      sum = Texel(max(old.albedo, sum.albedo), old.extinction + sum.extinction, old.emission + sum.emission);
+    }
+    storeTexel(block.slot, texel, sum);
+  }
+}

@@ -1,0 +1,70 @@
+// What the host writes and the metavoxel passes read. Shared by C++ and GLSL, like interface.h.
+//
+// Space: voxels of one size in a frame whose z axis runs along the light; `voxel` counts them from the space's corner,
+// whole numbers plus a half at their centres. A cell is the place of a metavoxel: `inner` voxels an edge. A metavoxel
+// holds its cell's voxels and a border of one: `edge` texels an edge. Occupied cells are numbered by position, the
+// order in which they are drawn.
+#ifndef BILLOW_SHADERS_METAVOXEL_INTERFACE_H
+#define BILLOW_SHADERS_METAVOXEL_INTERFACE_H
+
+#include "interface.h"
+
+#ifdef __cplusplus
+namespace billow::runtime::gpu {
+#endif
+
+BILLOW_GPU_CONST kPlanes = 5u;      // of the frustum: near, left, right, lower, upper
+BILLOW_GPU_CONST kSubBlock = 8u;    // texels an edge of what one workgroup of fill writes
+BILLOW_GPU_CONST kVolumeBit = 24u;  // of a cell's word: below it particles are counted, from it on volumes flagged
+BILLOW_GPU_CONST kMaxVolumes = 8u;
+BILLOW_GPU_CONST kCubeLayers = 6u;       // of a cube map: faces, each with a border of one texel
+BILLOW_GPU_CONST kCubeFaceTexels = 66u;  // an edge, border included
+
+BILLOW_GPU_CONST kFlagCull = 1u;        // cells that neither the eye sees nor light passes on its way to what it sees
+BILLOW_GPU_CONST kFlagReciprocal = 2u;  // 1 / (1 + d) in place of exp(-d)
+BILLOW_GPU_CONST kFlagSceneDepth = 4u;  // rays end at the scene
+
+// One thing to draw: the metavoxels at positions first to first + count - 1.
+struct MetavoxelRound {
+  uvec4 range;    // first, count, 1: in front of all that were drawn before, 0: behind; 0
+  uvec4 fill;     // indirect dispatch of fill's workgroups, 0
+  uvec4 columns;  // of passes with a thread a column of texels, 0
+  uvec4 march;    // of the picture's workgroups, 0
+};
+BILLOW_GPU_SIZE(MetavoxelRound, 64);
+
+struct MetavoxelCounters {
+  uvec4 wanted;  // occupied cells (more than fit are left out), list entries, the same; drawn cells; 0
+  uvec4 boxMin;  // largest of ~cell over drawn cells
+  uvec4 boxMax;  // largest of cell + 1; w: number of the draw
+  uvec4 reset;   // indirect dispatch of the next frame's clearing; w: 1 where everything is cleared
+  uvec4 rank;    // indirect dispatch, a thread an occupied cell; w: cells in front of which later rounds are drawn
+};
+BILLOW_GPU_SIZE(MetavoxelCounters, 80);
+
+struct MetavoxelParams {
+  vec4 toVoxel[3];       // rows: voxel = dot(row.xyz, world - centre) + row.w
+  vec4 toWorld[3];       // world step of a voxel along each axis of the space; w: middle of the space, in voxels
+  vec4 eye;              // world - centre; w: voxel edge in world units
+  vec4 planes[kPlanes];  // inside where dot(plane.xyz, voxel) + plane.w >= 0
+  vec4 tint;      // extinction of red, green and blue light on its way from the sun, as multiples of the extinction
+  uvec4 space;    // cells an axis, edge, inner, flags
+  uvec4 pool;     // slots along x, slots along y, slots, most occupied cells
+  uvec4 limits;   // particles, list entries, volumes, rounds
+  uvec4 picture;  // workgroups of the march along x, along y; number of the draw; 0
+  uvec4 cells;    // addresses (low, high): words; positions + 1, 0 where nothing is drawn
+  uvec4 items;    // addresses: occupied cells in the order of their finding; cells by position
+  uvec4 lists;    // addresses: first and count of the list at each position; cursors into them
+  uvec4 entries;  // addresses: particle numbers of all lists; particles
+  uvec4 texels;   // addresses: emission of each texel of the pool (RGB9E5); optical depth of columns by position
+  uvec4 tables;   // addresses: materials; curves
+  uvec4 ramps;    // addresses: ramps; counters
+  uvec4 rounds;   // address of the rounds, 0, 0
+};
+BILLOW_GPU_SIZE(MetavoxelParams, 25 * 16);
+
+#ifdef __cplusplus
+}  // namespace billow::runtime::gpu
+#endif
+
+#endif  // BILLOW_SHADERS_METAVOXEL_INTERFACE_H

@@ -1,0 +1,40 @@
+// Light through the round's metavoxels, a thread a column: what each voxel gives off towards the eye.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+
+#include "metavoxel_column.glsl"
+#include "phase.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+vec3 sunAt(float depth, vec3 voxel) {
+  const float cosine = dot(normalize(worldOf(voxel) - meta.eye.xyz), params.sun.xyz);
+  if (meta.tint.rgb == vec3(1.0)) return params.sunLight.rgb * scatteredShare(exp(-depth), cosine);
+  const vec3 arrives = exp(-depth * meta.tint.rgb);
+  return params.sunLight.rgb * vec3(scatteredShare(arrives.r, cosine), scatteredShare(arrives.g, cosine),
+                                    scatteredShare(arrives.b, cosine));
+}
+
+void main() {
+  const Column column = columnOf();
+  const uint edge = edgeTexels();
+  if (any(greaterThanEqual(column.texel, uvec2(edge)))) return;
+  float depth = depthAbove(column.cell, column.texel);
+  for (uint z = 0u; z < edge; ++z) {
+    const uvec3 texel = uvec3(column.texel, z);
+    const Texel matter = loadTexel(column.slot, texel);
+    const float through = lightDepth(matter.extinction);
+    // The first texel is the border, which the light has left behind.
+    if (z == 0u) depth -= through;
+    vec3 radiance = matter.emission;
+    if (matter.extinction > 0.0) {
+      const vec3 light = sunAt(max(depth + 0.5 * through, 0.0), texelVoxel(column.cell, texel)) + params.ambient.rgb;
+      radiance += matter.albedo * matter.extinction * light;
+    }
+    depth += through;
+    imageStore(pool, ivec3(slotCorner(column.slot) + texel),
+               vec4(clamp(radiance, vec3(-kLargestHalf), vec3(kLargestHalf)), matter.extinction));
+  }
+}

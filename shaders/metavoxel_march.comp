@@ -1,0 +1,114 @@
+// Marches the round's metavoxels, a thread a pixel. Samples lie at whole steps of depth along `forward`, whichever
+// metavoxel they fall into, so that a picture of many is that of one.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+
+#include "metavoxel_picture.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(set = 1, binding = 2) uniform sampler3D lit;
+layout(set = 1, binding = 7, r32f) readonly uniform image2D sceneDepth;  // along `forward`
+
+struct Ray {  // in voxels of the space; t is the distance in world units
+  vec3 origin;
+  vec3 direction;
+  vec3 inverse;
+  float perDepth;  // t a unit of depth
+};
+
+struct Box {  // cells
+  uvec3 low;
+  uvec3 high;  // past the end
+};
+
+const float kFar = 3.0e38;
+
+Ray makeRay(vec2 unit) {
+  const vec3 along =
+      params.forward.xyz + (2.0 * unit.x - 1.0) * params.right.xyz + (1.0 - 2.0 * unit.y) * params.up.xyz;
+  const vec3 direction = voxelsAlong(normalize(along));
+  const vec3 safe = mix(direction, vec3(1e-12), lessThan(abs(direction), vec3(1e-12)));
+  return Ray(voxelOf(meta.eye.xyz), direction, 1.0 / safe, length(along));
+}
+
+vec2 crossBox(Ray ray, vec3 low, vec3 high) {
+  const vec3 a = (low - ray.origin) * ray.inverse;
+  const vec3 b = (high - ray.origin) * ray.inverse;
+  const vec3 near = min(a, b);
+  const vec3 far = max(a, b);
+  return vec2(max(max(near.x, near.y), near.z), min(min(far.x, far.y), far.z));
+}
+
+// A fixed pattern in [0, 1) that hides banding (Jimenez 2014, "Next generation post processing in Call of Duty").
+float interleavedNoise(vec2 pixel) { return fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715)))); }
+
+// One step of length dt, as the direct march has it; both values are per voxel edge.
+void shade(vec4 value, float depth, float dt, inout Sum sum) {
+  const float edges = dt / meta.eye.w;
+  const float opticalDepth = value.a * edges;
+  const float after = exp(-opticalDepth);
+  const float span = opticalDepth < 1e-3 ? edges * (1.0 - 0.5 * opticalDepth) : (1.0 - after) / value.a;
+  sum.radiance += sum.transmittance * value.rgb * span;
+  sum.depth += sum.transmittance * (1.0 - after) * depth;
+  sum.transmittance *= after;
+}
+
+vec4 readSlot(uint slot, vec3 inCell) {
+  return textureLod(lit, (vec3(slotCorner(slot)) + inCell + 1.0) / vec3(textureSize(lit, 0)), 0.0);
+}
+
+Sum march(Ray ray, float end, float shift, float seen) {
+  Sum sum = Sum(vec3(0.0), 1.0, 0.0);
+  const MetavoxelCounters counters = Counters(meta.ramps.zw).value;
+  const uvec4 range = Rounds(meta.rounds.xy).items[pass.round].range;
+  const Box box = Box(~counters.boxMin.xyz, counters.boxMax.xyz);
+  const float inner = float(innerVoxels());
+  const vec2 span = crossBox(ray, vec3(box.low) * inner, vec3(box.high) * inner);
+  const float dt = params.forward.w * meta.eye.w * ray.perDepth;
+  const float stop = min(span.y, end);
+  if (range.y == 0u || !(max(span.x, 0.0) < stop)) return sum;
+  float k = max(ceil(span.x / dt - shift), 0.0);
+  while (sum.transmittance * seen > kOpaque) {
+    const float t = (k + shift) * dt;
+    // A step that crosses the end counts for what lies before it.
+    const float length = min(dt, end - (t - 0.5 * dt));
+    if (t >= span.y || length <= 0.0) break;
+    const vec3 voxel = ray.origin + ray.direction * t;
+    const vec3 cell = clamp(floor(voxel / inner), vec3(box.low), vec3(box.high - 1u));
+    const uint slot = positionOf(uvec3(cell)) - range.x;
+    if (slot < range.y) {
+      shade(readSlot(slot, clamp(voxel - cell * inner, 0.0, inner)), t / ray.perDepth, length, sum);
+      k += 1.0;
+    } else {
+      const float leave = crossBox(ray, cell * inner, (cell + 1.0) * inner).y;
+      k = max(k + 1.0, ceil(leave / dt - shift));
+    }
+  }
+  return sum;
+}
+
+void main() {
+  const ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+  const ivec2 size = ivec2(params.size.xy);
+  if (any(greaterThanEqual(pixel, size))) return;
+  const Ray ray = makeRay((vec2(pixel) + 0.5) / vec2(size));
+  const float end = hasFlag(kFlagSceneDepth) ? imageLoad(sceneDepth, pixel).r * ray.perDepth : kFar;
+  const float shift = params.size.w != 0u ? interleavedNoise(vec2(pixel)) : 0.5;
+  Sum sum;
+  if (pass.round == 0u) {
+    sum = march(ray, end, shift, 1.0);
+  } else {
+    const Sum old = loadSum(pixel);
+    const bool front = Rounds(meta.rounds.xy).items[pass.round].range.z != 0u;
+    // Behind what is opaque nothing is seen.
+    const Sum mine = march(ray, end, shift, front ? 1.0 : old.transmittance);
+    sum = front ? inFront(mine, old) : inFront(old, mine);
+  }
+  if (pass.finish != 0u) {
+    storePicture(pixel, sum);
+  } else {
+    storeSum(pixel, sum);
+  }
+}

@@ -1,0 +1,51 @@
+// One workgroup: how many metavoxels there are, and which rounds draw them.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+
+#include "metavoxel_order.glsl"
+
+layout(local_size_x = 256) in;
+
+shared uint before;
+
+void planRounds(uint items) {
+  Rounds rounds = Rounds(meta.rounds.xy);
+  const uint blocks = (edgeTexels() + kSubBlock - 1u) / kSubBlock;
+  uint next = 0u;
+  for (uint i = 0u; i < meta.limits.w; ++i) {
+    const bool front = next < before;
+    const uint count = min((front ? before : items) - next, meta.pool.z);
+    const uint some = count == 0u ? 0u : 1u;
+    const uint march = i == 0u ? 1u : some;  // the first begins the picture
+    rounds.items[i].range = uvec4(next, count, front ? 1u : 0u, 0u);
+    rounds.items[i].fill = uvec4(blocks * blocks * blocks * some, count, some, 0u);
+    rounds.items[i].columns = uvec4(blocks * blocks * some, count, some, 0u);
+    rounds.items[i].march = uvec4(meta.picture.xy * march, march, 0u);
+    next += count;
+  }
+}
+
+void main() {
+  Counters counters = Counters(meta.ramps.zw);
+  const uint wanted = counters.value.wanted.x;
+  const uint items = min(wanted, meta.pool.w);
+  if (gl_LocalInvocationID.x == 0u) before = 0u;
+  barrier();
+  const bool whole = items <= meta.pool.z;
+  uint mine = 0u;
+  for (uint i = gl_LocalInvocationID.x; i < items && !whole; i += 256u) {
+    if (beforeEye(cellOf(Words(meta.items.xy).items[i]))) ++mine;
+  }
+  atomicAdd(before, mine);
+  barrier();
+  if (gl_LocalInvocationID.x != 0u) return;
+  const bool all = wanted > meta.pool.w;
+  const uint cells = cellsAxis() * cellsAxis() * cellsAxis();
+  counters.value.reset = uvec4(((all ? cells : items) + 255u) / 256u, 1u, 1u, all ? 1u : 0u);
+  counters.value.rank = uvec4((items + 255u) / 256u, 1u, 1u, before);
+  counters.value.wanted.z = items;
+  counters.value.boxMax.w = meta.picture.z;
+  planRounds(items);
+}
