@@ -27,8 +27,7 @@ struct CameraRequest {
 };
 
 struct LookRequest {
-  std::optional<float> extinctionScale, anisotropy, emissionScale, temperatureScale, temperatureOffset;
-  std::optional<Triple> albedo, ambient;
+  format::LookRecord record{};  // what it sets replaces the pack's and what was fitted
   std::optional<std::uint32_t> scatteringOrders;
   float density = 1;  // factor on the extinction scale
   float fire = 1;     // factor on the emission scale
@@ -80,7 +79,7 @@ struct Bounds {
 };
 Checked<Triple> parseTriple(const std::string& text, const char* option, const Bounds& bounds);
 
-inline constexpr double kLargest = 1e9;                  // of colours, intensities and components of a direction
+inline constexpr double kLargest = 1e9;  // of colours, intensities, factors and components of a direction
 inline constexpr std::uint32_t kLargestPicture = 16384;  // pixels an edge
 
 }  // namespace billow::command

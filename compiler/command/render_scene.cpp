@@ -1,216 +1,110 @@
-#include <fmt/format.h>
-
-#include <cmath>
 #include <filesystem>
-#include <functional>
-#include <map>
-#include <nlohmann/json.hpp>
 
-#include "billow/format/source.h"
 #include "command.h"
+#include "json/document.h"
+#include "json/look.h"
 #include "render_request.h"
 
 namespace billow::command {
 namespace {
 
-using nlohmann::json;
+using json::Range;
+using json::Value;
 
-// Throws Refusal, caught in readScene: a scene has many ways to be wrong, and each leaves from the depth of it.
-class SceneReader {
- public:
-  explicit SceneReader(const std::string& path) : path_(path) {}
+constexpr Range kAnywhere{-kLargest, kLargest};
+constexpr Range kPositive{0, kLargest};
 
-  using Member = std::function<void(const json&, const std::string& at)>;
-
-  [[noreturn]] void fail(const std::string& at, const json& value, const std::string& expected) const {
-    std::string shown = value.dump(-1, ' ', false, json::error_handler_t::replace);
-    if (shown.size() > 60) shown = shown.substr(0, 57) + "...";
-    throw Refusal{kInvalid,
-                  fmt::format("{}: {} is {}; expected {}", path_, at.empty() ? "the scene" : at, shown, expected)};
-  }
-
-  void object(const json& value, const std::string& at, const std::map<std::string, Member>& members) const {
-    if (!value.is_object()) fail(at, value, "an object");
-    for (const auto& [key, child] : value.items()) {
-      const auto member = members.find(key);
-      const std::string childAt = at.empty() ? key : at + "." + key;
-      if (member == members.end()) {
-        std::string known;
-        for (const auto& [name, read] : members) known.append(known.empty() ? "" : ", ").append(name);
-        throw Refusal{kInvalid, fmt::format("{}: {} is not known; expected one of {}", path_, childAt, known)};
-      }
-      member->second(child, childAt);
-    }
-  }
-
-  double number(const json& value, const std::string& at, double low, double high) const {
-    const double got = value.is_number() ? value.get<double>() : std::nan("");
-    if (!(got >= low && got <= high)) fail(at, value, fmt::format("a number from {} to {}", low, high));
-    return got;
-  }
-
-  std::array<double, 3> triple(const json& value, const std::string& at, double low, double high) const {
-    if (!value.is_array() || value.size() != 3) fail(at, value, "an array of three numbers");
-    std::array<double, 3> numbers;
-    for (std::size_t i = 0; i < 3; ++i) numbers[i] = number(value[i], fmt::format("{}[{}]", at, i), low, high);
-    return numbers;
-  }
-
-  std::string text(const json& value, const std::string& at) const {
-    if (!value.is_string() || value.get<std::string>().empty()) fail(at, value, "a text that is not empty");
-    return value.get<std::string>();
-  }
-
-  Member into(std::optional<float>& field, double low, double high) const {
-    return [this, &field, low, high](const json& value, const std::string& at) {
-      field = static_cast<float>(number(value, at, low, high));
-    };
-  }
-  Member into(float& field, double low, double high) const {
-    return [this, &field, low, high](const json& value, const std::string& at) {
-      field = static_cast<float>(number(value, at, low, high));
-    };
-  }
-  Member into(std::optional<Triple>& field, double low, double high) const {
-    return [this, &field, low, high](const json& value, const std::string& at) {
-      const auto v = triple(value, at, low, high);
-      field = {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
-    };
-  }
-  Member into(std::optional<std::array<double, 3>>& field) const {
-    return [this, &field](const json& value, const std::string& at) { field = triple(value, at, -1e9, 1e9); };
-  }
-  Member into(std::optional<std::string>& field) const {
-    return [this, &field](const json& value, const std::string& at) { field = text(value, at); };
-  }
-
- private:
-  const std::string& path_;
-};
-
-SceneReader::Member readCamera(const SceneReader& scene, RenderRequest& request) {
-  return [&scene, &request](const json& value, const std::string& at) {
-    CameraRequest& camera = request.camera;
-    scene.object(value, at,
-                 {{"eye", scene.into(camera.eye)},
-                  {"target", scene.into(camera.target)},
-                  {"fieldOfView", scene.into(camera.fieldOfView, 1, 170)},
-                  {"up", [&](const json& up, const std::string& upAt) {
-                     const std::string name = scene.text(up, upAt);
-                     if (name != "y" && name != "z") scene.fail(upAt, up, "\"y\" or \"z\"");
-                     request.up = name[0];
-                   }}});
-    if (camera.eye.has_value() != camera.target.has_value()) scene.fail(at, value, "both eye and target, or neither");
-    if (camera.eye && *camera.eye == *camera.target) scene.fail(at, value, "an eye that is not at the target");
-  };
+// A member's value into the field, where there is one.
+void readNumber(const Value& object, const char* key, const Range& range, float& field) {
+  if (const auto member = object.find(key)) field = member->single(range);
 }
 
-SceneReader::Member readSun(const SceneReader& scene, RenderRequest& request) {
-  return [&scene, &request](const json& value, const std::string& at) {
-    scene.object(value, at,
-                 {{"direction", scene.into(request.sunDirection, -kLargest, kLargest)},
-                  {"color", scene.into(request.sunColor, 0, kLargest)},
-                  {"intensity", scene.into(request.sunIntensity, 0, kLargest)}});
-    if (request.sunDirection == Triple{0, 0, 0}) scene.fail(at, value, "a direction that is not zero");
-  };
+void readText(const Value& object, const char* key, const char* expected, std::optional<std::string>& field) {
+  if (const auto member = object.find(key)) field = member->text(expected);
 }
 
-SceneReader::Member readLook(const SceneReader& scene, RenderRequest& request) {
-  return [&scene, &request](const json& value, const std::string& at) {
-    LookRequest& look = request.look;
-    scene.object(value, at,
-                 {{"extinctionScale", scene.into(look.extinctionScale, 0, kLargest)},
-                  {"albedo", scene.into(look.albedo, 0, 1)},
-                  {"anisotropy", scene.into(look.anisotropy, -0.99, 0.99)},
-                  {"emissionScale", scene.into(look.emissionScale, 0, kLargest)},
-                  {"temperatureScale", scene.into(look.temperatureScale, -kLargest, kLargest)},
-                  {"temperatureOffset", scene.into(look.temperatureOffset, -kLargest, kLargest)},
-                  {"ambient", scene.into(look.ambient, 0, kLargest)},
-                  {"density", scene.into(look.density, 0, kLargest)},
-                  {"fire", scene.into(look.fire, 0, kLargest)},
-                  {"scatteringOrders", [&](const json& orders, const std::string& ordersAt) {
-                     if (!orders.is_number_integer()) scene.fail(ordersAt, orders, "a whole number from 1 to 8");
-                     look.scatteringOrders = static_cast<std::uint32_t>(scene.number(orders, ordersAt, 1, 8));
-                   }}});
-  };
+void readCamera(const Value& value, RenderRequest& request) {
+  value.requireKeys({"eye", "target", "fieldOfView", "up"});
+  CameraRequest& camera = request.camera;
+  if (const auto eye = value.find("eye")) camera.eye = eye->numbers<3>(kAnywhere);
+  if (const auto target = value.find("target")) camera.target = target->numbers<3>(kAnywhere);
+  readNumber(value, "fieldOfView", {1, 170}, camera.fieldOfView);
+  if (const auto up = value.find("up")) request.up = "yz"[up->word({"y", "z"})];
+  if (camera.eye.has_value() != camera.target.has_value()) value.fail("both eye and target, or neither");
+  if (camera.eye && *camera.eye == *camera.target) value.fail("an eye that is not at the target");
 }
 
-SceneReader::Member readBackground(const SceneReader& scene, RenderRequest& request) {
-  return [&scene, &request](const json& value, const std::string& at) {
-    if (value.is_string()) {
-      if (value != "none") scene.fail(at, value, "\"none\" or an object with bottom and top");
-      request.background.kind = BackgroundRequest::Kind::none;
-      return;
-    }
-    std::optional<Triple> bottom, top;
-    scene.object(value, at, {{"bottom", scene.into(bottom, 0, kLargest)}, {"top", scene.into(top, 0, kLargest)}});
-    if (!bottom || !top) scene.fail(at, value, "both bottom and top");
-    request.background = {BackgroundRequest::Kind::colors, *bottom, *top};
-  };
+void readSun(const Value& value, RenderRequest& request) {
+  value.requireKeys({"direction", "color", "intensity"});
+  if (const auto direction = value.find("direction")) request.sunDirection = direction->singles<3>(kAnywhere);
+  if (const auto color = value.find("color")) request.sunColor = color->singles<3>(kPositive);
+  if (const auto intensity = value.find("intensity")) request.sunIntensity = intensity->single(kPositive);
+  if (request.sunDirection == Triple{0, 0, 0}) value.fail("a direction that is not zero");
 }
 
-SceneReader::Member readSize(const SceneReader& scene, RenderRequest& request) {
-  return [&scene, &request](const json& value, const std::string& at) {
-    const auto whole = [](const json& edge) { return edge.is_number_integer(); };
-    if (!value.is_array() || value.size() != 2 || !whole(value[0]) || !whole(value[1])) {
-      scene.fail(at, value, "[width, height] in pixels");
-    }
-    request.width = static_cast<std::uint32_t>(scene.number(value[0], at + "[0]", 1, kLargestPicture));
-    request.height = static_cast<std::uint32_t>(scene.number(value[1], at + "[1]", 1, kLargestPicture));
-  };
+void readLook(const Value& value, LookRequest& look) {
+  look.record = json::readLook(value, {"density", "fire", "scatteringOrders"});
+  readNumber(value, "density", kPositive, look.density);
+  readNumber(value, "fire", kPositive, look.fire);
+  if (const auto orders = value.find("scatteringOrders")) {
+    look.scatteringOrders = static_cast<std::uint32_t>(orders->integer(1, 8));
+  }
 }
 
-SceneReader::Member readFilter(const SceneReader& scene, RenderRequest& request) {
-  return [&scene, &request](const json& value, const std::string& at) {
-    const std::string name = scene.text(value, at);
-    if (name != "nearest" && name != "trilinear") scene.fail(at, value, "\"nearest\" or \"trilinear\"");
-    request.filter = name == "nearest" ? runtime::Filter::nearest : runtime::Filter::trilinear;
-  };
+BackgroundRequest readBackground(const Value& value) {
+  BackgroundRequest background;
+  if (value.isString()) {
+    if (value.text("") != "none") value.fail("\"none\" or an object with bottom and top");
+    background.kind = BackgroundRequest::Kind::none;
+    return background;
+  }
+  value.requireKeys({"bottom", "top"});
+  background = {BackgroundRequest::Kind::colors, value.at("bottom").singles<3>(kPositive),
+                value.at("top").singles<3>(kPositive)};
+  return background;
 }
 
-SceneReader::Member readGrids(const SceneReader& scene, RenderRequest& request) {
-  return [&scene, &request](const json& value, const std::string& at) {
-    scene.object(value, at,
-                 {{"extinction", scene.into(request.grids.extinction)},
-                  {"temperature", scene.into(request.grids.temperature)},
-                  {"flames", scene.into(request.grids.flames)}});
-  };
+void readSize(const Value& value, RenderRequest& request) {
+  const auto edges = value.items(2, "[width, height] in pixels");
+  request.width = static_cast<std::uint32_t>(edges[0].integer(1, kLargestPicture));
+  request.height = static_cast<std::uint32_t>(edges[1].integer(1, kLargestPicture));
 }
 
-void readDocument(const SceneReader& scene, const json& document, const std::string& path, RenderRequest& request) {
-  scene.object(document, "",
-               {{"$schema", [&](const json& value, const std::string& at) { scene.text(value, at); }},
-                {"pack",
-                 [&](const json& value, const std::string& at) {
-                   const std::filesystem::path pack = scene.text(value, at);
-                   request.pack = (std::filesystem::path(path).parent_path() / pack).string();
-                 }},
-                {"volume", scene.into(request.volume)},
-                {"grids", readGrids(scene, request)},
-                {"camera", readCamera(scene, request)},
-                {"sun", readSun(scene, request)},
-                {"look", readLook(scene, request)},
-                {"background", readBackground(scene, request)},
-                {"size", readSize(scene, request)},
-                {"exposure", scene.into(request.exposure, -32, 32)},
-                {"filter", readFilter(scene, request)}});
-  if (request.pack.empty()) throw Refusal{kInvalid, path + ": pack is missing; expected the path of a pack"};
+void readGrids(const Value& value, GridNames& grids) {
+  value.requireKeys({"extinction", "temperature", "flames"});
+  readText(value, "extinction", "a grid's name", grids.extinction);
+  readText(value, "temperature", "a grid's name", grids.temperature);
+  readText(value, "flames", "a grid's name", grids.flames);
+}
+
+void readDocument(const Value& scene, const std::filesystem::path& folder, RenderRequest& request) {
+  scene.requireKeys(
+      {"$schema", "pack", "volume", "grids", "camera", "sun", "look", "background", "size", "exposure", "filter"});
+  request.pack = (folder / scene.at("pack").text("the path of a pack")).string();
+  readText(scene, "volume", "a volume's name", request.volume);
+  if (const auto grids = scene.find("grids")) readGrids(*grids, request.grids);
+  if (const auto camera = scene.find("camera")) readCamera(*camera, request);
+  if (const auto sun = scene.find("sun")) readSun(*sun, request);
+  if (const auto look = scene.find("look")) readLook(*look, request.look);
+  if (const auto background = scene.find("background")) request.background = readBackground(*background);
+  if (const auto size = scene.find("size")) readSize(*size, request);
+  readNumber(scene, "exposure", {-32, 32}, request.exposure);
+  if (const auto filter = scene.find("filter")) {
+    constexpr runtime::Filter kFilters[] = {runtime::Filter::nearest, runtime::Filter::trilinear};
+    request.filter = kFilters[filter->word({"nearest", "trilinear"})];
+  }
 }
 
 }  // namespace
 
 Checked<void> readScene(const std::string& path, RenderRequest& request) {
-  const auto text = format::readTextFile(path);
-  if (!text) return tl::unexpected(Refusal{kFile, fmt::format("{}: cannot be read: {}", path, text.error().detail)});
   try {
-    const SceneReader scene(path);
-    readDocument(scene, json::parse(*text), path, request);
-  } catch (const json::parse_error& error) {
-    return tl::unexpected(Refusal{kInvalid, fmt::format("{}: no JSON at byte {}", path, error.byte)});
-  } catch (const json::exception& error) {  // a number that no double holds
-    return tl::unexpected(Refusal{kInvalid, fmt::format("{}: not usable JSON: {}", path, error.what())});
-  } catch (const Refusal& refusal) {
-    return tl::unexpected(refusal);
+    const json::Document document(path);
+    readDocument(document.root(), std::filesystem::path(path).parent_path(), request);
+  } catch (const json::FileError& error) {
+    return tl::unexpected(Refusal{kFile, error.what()});
+  } catch (const json::Error& error) {
+    return tl::unexpected(Refusal{kInvalid, error.what()});
   }
   return {};
 }

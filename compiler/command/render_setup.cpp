@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "billow/format/look.h"
+
 namespace billow::command {
 namespace {
 
@@ -85,15 +87,17 @@ runtime::Background chooseBackground(const RenderRequest& request, bool burning,
   return background;
 }
 
+// A scale times a factor, finite.
+float scaled(float scale, float factor) {
+  return static_cast<float>(std::min(double{scale} * double{factor}, double{format::kLargestLook}));
+}
+
+// `ambientGiven`: by the pack.
 runtime::Look chooseLook(const LookRequest& wanted, runtime::Look look, bool burning, bool ambientGiven) {
   if (!ambientGiven) look.ambient = burning ? Triple{0.05f, 0.06f, 0.08f} : Triple{0.07f, 0.10f, 0.14f};
-  look.extinctionScale = wanted.extinctionScale.value_or(look.extinctionScale) * wanted.density;
-  look.emissionScale = wanted.emissionScale.value_or(look.emissionScale) * wanted.fire;
-  look.anisotropy = wanted.anisotropy.value_or(look.anisotropy);
-  look.temperatureScale = wanted.temperatureScale.value_or(look.temperatureScale);
-  look.temperatureOffset = wanted.temperatureOffset.value_or(look.temperatureOffset);
-  look.albedo = wanted.albedo.value_or(look.albedo);
-  look.ambient = wanted.ambient.value_or(look.ambient);
+  runtime::applyLook(wanted.record, look);
+  look.extinctionScale = scaled(look.extinctionScale, wanted.density);
+  look.emissionScale = scaled(look.emissionScale, wanted.fire);
   look.scatteringOrders = wanted.scatteringOrders.value_or(look.scatteringOrders);
   return look;
 }
@@ -126,7 +130,7 @@ runtime::DrawInfo setUp(const RenderRequest& request, const format::Pack& pack, 
   draw.height = request.height;
   draw.colorFormat = runtime::ColorFormat::single;
   draw.view = chooseView(request, box, up);
-  const bool ambientGiven = (volume.look.set >> 6 & 1u) != 0;
+  const bool ambientGiven = format::isSet(volume.look, format::kLookAmbient);
   const bool burning = suggested.emissionScale > 0 && request.look.fire > 0;
   draw.look = chooseLook(request.look, suggested, burning, ambientGiven);
   draw.sun = chooseSun(request, up, burning);

@@ -81,6 +81,7 @@ Result<std::unique_ptr<ByteSource>> openFileSource(const std::string& path) {
 Result<std::string> readTextFile(const std::string& path) {
   const auto source = openFileSource(path);
   if (!source) return tl::make_unexpected(source.error());
+  if ((*source)->size() > kMostTextBytes) return refused(EFBIG);
   std::string text((*source)->size(), '\0');
   if (!(*source)->read(0, std::as_writable_bytes(std::span(text)))) return refused(EIO);
   return text;

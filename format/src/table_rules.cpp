@@ -6,12 +6,11 @@
 #include <set>
 
 #include "billow/format/affine.h"
+#include "billow/format/look.h"
 #include "rules.h"
 
 namespace billow::format {
 namespace {
-
-constexpr std::uint32_t kLookFields = 7;  // of LookRecord, `set` and `reserved` apart
 
 bool finite(double value) {
   return std::isfinite(value);
@@ -31,25 +30,17 @@ bool allZero(const std::uint32_t (&values)[N]) {
 
 void checkLook(const LookRecord& look, const Place& place, IssueSink& sink) {
   if (!allZero(look.reserved)) sink.report(Rule::tableReserved, place, "A reserved field of a look is not.");
-  if (look.set >> kLookFields != 0) sink.report(Rule::look, place, fmt::format("Unknown bits in {:#x}.", look.set));
-  std::uint32_t bit = 0;
-  const auto check = [&](std::string_view name, std::span<const float> values, float low, float high, bool open) {
-    const bool given = (look.set >> bit++ & 1u) != 0;
-    for (const float value : values) {
-      const bool inside = open ? value > low && value < high : value >= low && value <= high;
-      if (given ? !(finite(value) && inside) : value != 0) {
-        sink.report(Rule::look, place, fmt::format("{} {} is {}.", given ? "The set" : "The unset", name, value));
-      }
+  if (look.set >> kLookFieldCount != 0) {
+    sink.report(Rule::look, place, fmt::format("Unknown bits in {:#x}.", look.set));
+  }
+  for (std::uint32_t field = 0; field < kLookFieldCount; ++field) {
+    const bool given = isSet(look, field);
+    for (const float value : lookValues(look, field)) {
+      if (given ? finite(value) && kLookFields[field].holds(value) : value == 0) continue;
+      sink.report(Rule::look, place,
+                  fmt::format("{} {} is {}.", given ? "The set" : "The unset", kLookFields[field].name, value));
     }
-  };
-  constexpr float kMost = std::numeric_limits<float>::max();
-  check("extinctionScale", std::span(&look.extinctionScale, 1), 0, kMost, false);
-  check("albedo", look.albedo, 0, 1, false);
-  check("anisotropy", std::span(&look.anisotropy, 1), -1, 1, true);
-  check("emissionScale", std::span(&look.emissionScale, 1), 0, kMost, false);
-  check("temperatureScale", std::span(&look.temperatureScale, 1), -kMost, kMost, false);
-  check("temperatureOffset", std::span(&look.temperatureOffset, 1), -kMost, kMost, false);
-  check("ambient", look.ambient, 0, kMost, false);
+  }
 }
 
 // Whether the volumes divide the other tables among themselves, so that records may be found through them.

@@ -7,6 +7,7 @@
 
 #include "billow/format/affine.h"
 #include "billow/format/grid_view.h"
+#include "billow/format/look.h"
 
 namespace billow::runtime {
 namespace {
@@ -114,18 +115,6 @@ Result<void> fitExtinction(const format::Pack& pack, const format::VolumeRecord&
   return {};
 }
 
-// Fields that the pack sets replace those that were fitted.
-void applyRecord(const format::LookRecord& record, Look& look) {
-  const auto given = [&](std::uint32_t bit) { return (record.set >> bit & 1u) != 0; };
-  if (given(0)) look.extinctionScale = record.extinctionScale;
-  if (given(1)) std::copy(record.albedo, record.albedo + 3, look.albedo.begin());
-  if (given(2)) look.anisotropy = record.anisotropy;
-  if (given(3)) look.emissionScale = record.emissionScale;
-  if (given(4)) look.temperatureScale = record.temperatureScale;
-  if (given(5)) look.temperatureOffset = record.temperatureOffset;
-  if (given(6)) std::copy(record.ambient, record.ambient + 3, look.ambient.begin());
-}
-
 }  // namespace
 
 WorldBox worldBox(const format::Pack& pack, const format::VolumeRecord& volume, const GridChoice& grids,
@@ -152,12 +141,23 @@ WorldBox worldBox(const format::Pack& pack, const format::VolumeRecord& volume, 
   return box;
 }
 
+void applyLook(const format::LookRecord& record, Look& look) {
+  const auto given = [&](format::LookBit field) { return format::isSet(record, field); };
+  if (given(format::kLookExtinctionScale)) look.extinctionScale = record.extinctionScale;
+  if (given(format::kLookAlbedo)) std::copy(record.albedo, record.albedo + 3, look.albedo.begin());
+  if (given(format::kLookAnisotropy)) look.anisotropy = record.anisotropy;
+  if (given(format::kLookEmissionScale)) look.emissionScale = record.emissionScale;
+  if (given(format::kLookTemperatureScale)) look.temperatureScale = record.temperatureScale;
+  if (given(format::kLookTemperatureOffset)) look.temperatureOffset = record.temperatureOffset;
+  if (given(format::kLookAmbient)) std::copy(record.ambient, record.ambient + 3, look.ambient.begin());
+}
+
 Result<Look> suggestLook(const format::Pack& pack, const format::VolumeRecord& volume, const GridChoice& grids) {
   Look look;
   look.scatteringOrders = 4;
   if (auto fitted = fitExtinction(pack, volume, grids, look); !fitted) return tl::unexpected(fitted.error());
   if (auto fitted = fitHeat(pack, volume, grids, look); !fitted) return tl::unexpected(fitted.error());
-  applyRecord(volume.look, look);
+  applyLook(volume.look, look);
   return look;
 }
 

@@ -131,7 +131,8 @@ TEST_F(Render, OptionsChangeThePicture) {
 
 TEST_F(Render, ScenesSayWhatTheCommandLineSays) {
   writeFile(folder_ / "scene.json",
-            R"({"pack": "p.blw", "size": [32, 18], "sun": {"direction": [0, 1, 1], "intensity": 4}, "exposure": 1,
+            R"({// comments are allowed
+                "pack": "p.blw", "size": [32, 18], "sun": {"direction": [0, 1, 1], "intensity": 4}, "exposure": 1,
                 "camera": {"eye": [14, 16, 13], "target": [9, 9, 9], "fieldOfView": 40, "up": "y"},
                 "background": {"bottom": [0, 0, 0], "top": [0, 0, 1]}, "look": {"density": 2}, "filter": "nearest"})");
   ASSERT_EQ(render("'" + (folder_ / "scene.json") + "' --frame 7 -o '" + (folder_ / "a.png") + "'").code, 0);
@@ -145,7 +146,7 @@ TEST_F(Render, ScenesSayWhatTheCommandLineSays) {
 }
 
 TEST_F(Render, SceneErrorsNameTheirPlace) {
-  expectSceneRefused("{", "no JSON");
+  expectSceneRefused("{", "not JSON: line 1");
   expectSceneRefused("[]", "an object");
   expectSceneRefused(R"({"pack": "p.blw", "exposure": 1e999})", "scene.json");
   expectSceneRefused("{}", "pack is missing");
@@ -154,7 +155,8 @@ TEST_F(Render, SceneErrorsNameTheirPlace) {
   expectSceneRefused(R"({"pack": "p.blw", "camera": {"eye": [1, 2, 3]}})", "both eye and target");
   expectSceneRefused(R"({"pack": "p.blw", "look": {"albedo": [1, 2, 0]}})", "look.albedo[1] is 2");
   expectSceneRefused(R"({"pack": "p.blw", "size": [0, 4]})", "size[0] is 0");
-  expectSceneRefused(R"({"pack": "p.blw", "background": {"bottom": [0, 0, 0]}})", "both bottom and top");
+  expectSceneRefused(R"({"pack": "p.blw", "background": {"bottom": [0, 0, 0]}})", "background.top is missing");
+  expectSceneRefused(R"({"pack": "p.blw", "exposure": 1, "exposure": 2})", "exposure is there twice");
 }
 
 // The schema and the reader know the same members.

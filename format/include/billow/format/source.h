@@ -28,7 +28,10 @@ class ByteSource {
 // Reads by pread, so a file that shrinks or fails while open gives an error, not a signal.
 Result<std::unique_ptr<ByteSource>> openFileSource(const std::string& path);
 
-// The whole of a file that people write (a manifest, a scene). Errors: Rule::cannotOpen, whose detail says why.
+inline constexpr std::uint64_t kMostTextBytes = 16u << 20;
+
+// The whole of a file that people write (a manifest, a scene), of kMostTextBytes at most. Errors: Rule::cannotOpen,
+// whose detail says why.
 Result<std::string> readTextFile(const std::string& path);
 
 std::unique_ptr<ByteSource> makeMemorySource(std::vector<std::byte> bytes);

@@ -19,6 +19,9 @@ struct WorldBox {
 WorldBox worldBox(const format::Pack& pack, const format::VolumeRecord& volume, const GridChoice& grids,
                   std::uint32_t first, std::uint32_t last);
 
+// Replaces what the record sets.
+void applyLook(const format::LookRecord& record, Look& look);
+
 // A look for the whole volume, the same for each of its frames: what the pack's look record sets, and for the rest
 // values that fit the data. Reads one frame (the one with the most active voxels).
 Result<Look> suggestLook(const format::Pack& pack, const format::VolumeRecord& volume, const GridChoice& grids);
