@@ -14,7 +14,7 @@ layout(local_size_x = 8, local_size_y = 8, local_size_z = 4) in;
 const uint kBatch = 256u;
 const float kExtinctionUnits = 67108864.0;  // 2^26: optical depth of a voxel up to 32 in steps of 1.5e-8
 const float kEmissionUnits = 1048576.0;     // 2^20: up to 2048 in steps of 1e-6
-const uint kMostUnits = 0x80000000u;
+const uint kMostUnits = 0x7fffffffu;
 
 shared uint near[kBatch];  // the batch's particles that reach the block
 shared uint nearCount;
@@ -27,7 +27,7 @@ struct Sums {
 
 // Both are at most kMostUnits, and so is the result: the order of additions makes no difference.
 uint added(uint a, uint b) { return min(a + b, kMostUnits); }
-uint units(float amount, float scale) { return uint(min(amount * scale, float(kMostUnits)) + 0.5); }
+uint units(float amount, float scale) { return uint(min(amount * scale, 2147483520.0) + 0.5); }
 
 void add(Particle particle, vec3 place, inout Sums sums) {
   Matter matter;

@@ -211,7 +211,9 @@ class HeadlessImpl final : public Headless {
  private:
   static std::uint64_t uploadOf(const runtime::MetavoxelDraw& draw) {
     std::uint64_t value = 0;
-    for (const runtime::MetavoxelVolume& volume : draw.volumes) value = std::max(value, volume.frame->uploadValue());
+    for (const runtime::MetavoxelVolume& volume : draw.volumes) {
+      if (volume.frame != nullptr) value = std::max(value, volume.frame->uploadValue());
+    }
     return value;
   }
 
