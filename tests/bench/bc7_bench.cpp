@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "../brick_source.h"
 #include "encode/brick_lanes.h"
 #include "grid_corpus.h"
 
@@ -26,6 +27,7 @@ namespace {
 using namespace billow;
 using bench::Corpus;
 using tests::Brick;
+using tests::sourceOf;
 
 constexpr int kEfforts = 10;
 constexpr std::size_t kBricksAcross = 64;
@@ -33,12 +35,8 @@ constexpr std::size_t kBrickWidth = 8;    // texels
 constexpr std::size_t kBrickHeight = 16;  // two layers of 8, four slices each
 constexpr std::size_t kDdsHeader = 148;   // with the DX10 part
 
-compiler::BrickSource sourceOf(const Brick& brick) {
-  return {&brick.values, &brick.active, brick.activeCount, 0.0f};
-}
-
 compiler::TexelRange rangeOf(const Brick& brick) {
-  return compiler::coverRange(compiler::activeRange(sourceOf(brick)), 0, 255);
+  return compiler::coverRange(compiler::activeRange(sourceOf(brick, 0)), 0, 255);
 }
 
 std::string fileName(const Corpus& corpus) {
@@ -59,7 +57,7 @@ void writePng(const Corpus& corpus, const std::string& path) {
   for (std::size_t b = 0; b < corpus.bricks.size(); ++b) {
     const Brick& brick = corpus.bricks[b];
     compiler::TexelTargets targets;
-    compiler::texelTargets(sourceOf(brick), rangeOf(brick), 0, 255, targets);
+    compiler::texelTargets(sourceOf(brick, 0), rangeOf(brick), 0, 255, targets);
     for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) {
       const std::size_t x = i >> 6, y = i >> 3 & 7, z = i & 7;
       const std::size_t column = b % kBricksAcross * kBrickWidth + x;
@@ -105,7 +103,7 @@ double ddsError(const Corpus& corpus, const std::string& path) {
     candidate.scale = range.scale;
     format::Texels texels;
     format::decodeTexels(format::kEncodingBc7Z, {candidate.payload.data(), 128}, texels);
-    compiler::measure(sourceOf(corpus.bricks[b]), texels, candidate);
+    compiler::measure(sourceOf(corpus.bricks[b], 0), texels, candidate);
     squared += candidate.squaredError;
   }
   return squared;
@@ -126,7 +124,7 @@ Row measure(const std::string& name, const std::vector<Corpus>& corpora, const E
     double squared = 0;
     const std::clock_t begin = std::clock();
     for (const Brick& brick : corpus.bricks) {
-      encode(sourceOf(brick), candidate);
+      encode(sourceOf(brick, 0), candidate);
       squared += candidate.squaredError;
     }
     const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "grids.h"
 #include "import/vdb_write.h"
 #include "stages.h"
 #include "unit/run_command.h"
@@ -16,23 +17,8 @@ using compiler::ImportedGrid;
 
 // A ball of smoothly varying values, some of its bricks partly active, a tile beside it.
 ImportedGrid ball(float scale) {
-  ImportedGrid grid;
-  grid.present = true;
+  ImportedGrid grid = ballGrid({-1016, -16, 2000}, [scale](float density, std::int32_t) { return density * scale; });
   grid.indexToWorld = {0.25, 0, 0, 1, 0, 0.5, 0, -2, 0.125, 0, 0.25, 3};
-  for (std::int32_t brick = 0; brick < 64; ++brick) {
-    compiler::Leaf leaf{};
-    leaf.origin = {(brick >> 4) * 8 - 1016, (brick >> 2 & 3) * 8 - 16, (brick & 3) * 8 + 2000};
-    for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) {
-      const auto x = static_cast<float>((brick >> 4) * 8 + static_cast<std::int32_t>(i >> 6)) - 15.5f;
-      const auto y = static_cast<float>((brick >> 2 & 3) * 8 + static_cast<std::int32_t>(i >> 3 & 7)) - 15.5f;
-      const auto z = static_cast<float>((brick & 3) * 8 + static_cast<std::int32_t>(i & 7)) - 15.5f;
-      const float value = 1 - (x * x + y * y + z * z) / 256;
-      if (value <= 0) continue;
-      leaf.active.words[i >> 5] |= 1u << (i & 31);
-      leaf.values[i] = value * scale;
-    }
-    grid.leaves.push_back(leaf);
-  }
   grid.tiles.push_back({{128 * 3, 0, 2048}, 128, 0.5f * scale});
   return grid;
 }

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "billow/format/brick.h"
+#include "grids.h"
 #include "import/vdb_write.h"
 #include "stages.h"
 #include "unit/run_command.h"
@@ -48,31 +49,11 @@ print(json.dumps({
 
 // A ball of noise that no encoding but the widest meets exactly; `shift` is added in one brick only.
 ImportedGrid ball(float shift = 0) {
-  ImportedGrid grid;
-  grid.present = true;
   std::uint32_t random = 1;
-  for (std::int32_t brick = 0; brick < 64; ++brick) {
-    compiler::Leaf leaf{};
-    leaf.origin = {(brick >> 4) * 8 - 16, (brick >> 2 & 3) * 8 - 8, (brick & 3) * 8 + 2000};
-    for (std::uint32_t i = 0; i < format::kBrickVoxels; ++i) {
-      const auto x = static_cast<float>((brick >> 4) * 8 + static_cast<std::int32_t>(i >> 6)) - 15.5f;
-      const auto y = static_cast<float>((brick >> 2 & 3) * 8 + static_cast<std::int32_t>(i >> 3 & 7)) - 15.5f;
-      const auto z = static_cast<float>((brick & 3) * 8 + static_cast<std::int32_t>(i & 7)) - 15.5f;
-      const float value = 1 - (x * x + y * y + z * z) / 256;
-      if (value <= 0) continue;
-      random = random * 1664525 + 1013904223;
-      leaf.active.words[i >> 5] |= 1u << (i & 31);
-      leaf.values[i] = value + static_cast<float>(random >> 8) * 0x1p-26f + (brick == 21 ? shift : 0);
-    }
-    grid.leaves.push_back(leaf);
-  }
-  return grid;
-}
-
-ImportedGrid empty() {
-  ImportedGrid grid;
-  grid.present = true;
-  return grid;
+  return ballGrid({-16, -8, 2000}, [&](float density, std::int32_t brick) {
+    random = random * 1664525 + 1013904223;
+    return density + static_cast<float>(random >> 8) * 0x1p-26f + (brick == 21 ? shift : 0);
+  });
 }
 
 constexpr const char* kHostileName = R"(<script>alert("a" & 'b')</script>)";
@@ -81,7 +62,7 @@ class Report : public testing::Test {
  protected:
   // Two frames of a grid, of one with a hostile name and of one without a voxel.
   void SetUp() override {
-    const ImportedGrid density = ball(), none = empty();
+    const ImportedGrid density = ball(), none = emptyGrid();
     for (const char* name : {"s_4.vdb", "s_5.vdb"}) {
       compiler::writeVdb(folder_ / name, std::vector<compiler::VdbOutput>{{"density", true, {&density}},
                                                                           {kHostileName, false, {&density}},

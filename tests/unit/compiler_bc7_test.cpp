@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "brick_corpus.h"
+#include "brick_source.h"
 #include "encode/bc7_block.h"
 #include "stages.h"
 
@@ -21,13 +22,9 @@ using namespace billow;
 using compiler::Candidate;
 using tests::Brick;
 using tests::makeBrick;
+using tests::sourceOf;
 
-constexpr float kTile = -77.0f;
 constexpr int kLastEffort = 9;
-
-compiler::BrickSource sourceOf(const Brick& brick) {
-  return {&brick.values, &brick.active, brick.activeCount, kTile};
-}
 
 // Where about that many voxels of eight are active.
 std::function<bool(std::uint32_t)> share(std::uint32_t eighths) {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "brick_corpus.h"
+#include "brick_source.h"
 #include "encode/texel_range.h"
 #include "stages.h"
 
@@ -22,13 +23,9 @@ namespace {
 using namespace billow;
 using compiler::Candidate;
 using tests::Brick;
+using tests::kTile;
 using tests::makeBrick;
-
-constexpr float kTile = -77.0f;
-
-compiler::BrickSource sourceOf(const Brick& brick) {
-  return {&brick.values, &brick.active, brick.activeCount, kTile};
-}
+using tests::sourceOf;
 
 struct Encoder {
   std::string name;

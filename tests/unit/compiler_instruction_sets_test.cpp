@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "brick_corpus.h"
+#include "brick_source.h"
 #include "encode/bc7_block.h"
 #include "stages.h"
 
@@ -49,7 +50,7 @@ std::vector<std::byte> results(const Brick& brick) {
     const auto* begin = static_cast<const std::byte*>(data);
     bytes.insert(bytes.end(), begin, begin + size);
   };
-  const BrickSource source = {&brick.values, &brick.active, brick.activeCount, -7.0f};
+  const BrickSource source = tests::sourceOf(brick);
   const compiler::ValueRange range = compiler::activeRange(source);
   add(&range, sizeof range);
   const compiler::BrickTargets targets(source);
@@ -122,7 +123,7 @@ TEST(InstructionSets, allGiveTheSameBits) {
 // Weights that are all one must give what no weights give.
 TEST(InstructionSets, weightsOfOneChangeNothing) {
   for (const Brick& brick : tests::cloudBricks(16)) {
-    const BrickSource source = {&brick.values, &brick.active, brick.activeCount, 0.0f};
+    const BrickSource source = tests::sourceOf(brick);
     if (source.activeCount != format::kBrickVoxels) continue;
     compiler::BrickTargets targets(source);
     compiler::BlockTexels bare, weighted;

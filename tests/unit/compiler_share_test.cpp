@@ -7,10 +7,13 @@
 
 #include "billow/format/grid_view.h"
 #include "billow/format/validate.h"
+#include "grids.h"
 #include "share/share.h"
 
 namespace billow::compiler {
 namespace {
+
+using tests::emptyGrid;
 
 const std::string kWhere = "test";
 
@@ -56,12 +59,6 @@ class ShareTest : public testing::Test {
 
   std::string path_;
 };
-
-ImportedGrid emptyGrid() {
-  ImportedGrid grid;
-  grid.present = true;
-  return grid;
-}
 
 void addLeaf(ImportedGrid& grid, std::array<std::int32_t, 3> origin, float value) {
   Leaf leaf{};
