@@ -81,6 +81,7 @@ constexpr std::uint32_t largestTexel(std::uint32_t encoding) {
   if (encoding == kEncodingCoarse) return 64 * 255;
   const std::uint32_t bits = indexBits(encoding);
   if (bits == 0) return 255;
+  // NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): it takes a constant to be local, of -11 bits
   return ((1u << bits) - 1) * (isLocal(encoding) ? 255 : 1);
 }
 
