@@ -236,19 +236,19 @@ void runFile(const Arguments& arguments, const std::string& file, const std::str
   const auto ignore = [](const std::string&) {};
   const compiler::Plan plan = compiler::planInputs({file}, {}, ignore);
   const compiler::ImportedFrame source = compiler::importFrame(plan.volumes[0], plan.volumes[0].frames[0], {}, ignore);
-  const std::string stem = std::filesystem::path(file).stem().string();
+  const std::string stem = std::filesystem::path(file).stem().string(), begin = stem + "_";
   const std::string pack = work + "/pack.blw";
   compiler::Quality quality;
   quality.psnr = kReferencePsnr;
   compilePack(file, pack, quality);
   Scene scene(pack, arguments.size);
   const Drawn reference = scene.draw(pack);
-  writePictures(arguments, stem + "_reference", reference);
+  writePictures(arguments, begin + "reference", reference);
   for (const auto& [name, asked] : arguments.settings) {
     compilePack(file, pack, asked);
     const Sizes sizes = measurePack(pack, source);
     const Drawn drawn = scene.draw(pack);
-    writePictures(arguments, stem + "_" + name, drawn);
+    writePictures(arguments, begin + name, drawn);
     fmt::print("| {} | {} | {:.1f} | {:.1f} | {:.2f} | {:.2f} |", stem, name, static_cast<double>(sizes.gpu) * 1e-3,
                static_cast<double>(sizes.disk) * 1e-3, sizes.psnr, sizes.depthPsnr);
     for (std::size_t c = 0; c < std::size(kCameras); ++c) {
