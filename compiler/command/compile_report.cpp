@@ -73,6 +73,11 @@ void printReport(const compiler::CompileReport& report, const std::string& outpu
   fmt::print("{}: {} frame{}, {} on disk, {} on the GPU with all frames resident\n", output, report.frames,
              report.frames == 1 ? "" : "s", size(report.fileBytes), size(report.gpuBytes));
   for (const GridReport& grid : report.grids) printGrid(grid);
+  for (const compiler::EffectReport& effect : report.effects) {
+    fmt::print("\n{}: effect of {} emitter{}, at most {} particles alive\n", effect.name, effect.emitters,
+               effect.emitters == 1 ? "" : "s", effect.mostAlive);
+  }
+  if (!report.effects.empty()) fmt::print("Effects take {} in all\n", size(report.effectBytes));
 }
 
 nlohmann::ordered_json reportJson(const compiler::CompileReport& report, const std::string& output) {
@@ -83,6 +88,11 @@ nlohmann::ordered_json reportJson(const compiler::CompileReport& report, const s
   json["gpuBytes"] = report.gpuBytes;
   json["grids"] = Json::array();
   for (const GridReport& grid : report.grids) json["grids"].push_back(toJson(grid));
+  json["effectBytes"] = report.effectBytes;
+  json["effects"] = Json::array();
+  for (const compiler::EffectReport& effect : report.effects) {
+    json["effects"].push_back({{"name", effect.name}, {"emitters", effect.emitters}, {"mostAlive", effect.mostAlive}});
+  }
   return json;
 }
 

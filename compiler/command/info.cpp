@@ -68,11 +68,25 @@ Json toJson(const VolumeSummary& volume) {
   return json;
 }
 
+Json toJson(const EffectSummary& effect) {
+  Json json;
+  json["name"] = effect.name;
+  json["seconds"] = effect.duration;
+  json["loop"] = effect.loop;
+  json["mostAlive"] = effect.mostAlive;
+  json["emitters"] = Json::array();
+  for (const EmitterSummary& emitter : effect.emitters) {
+    json["emitters"].push_back({{"name", emitter.name}, {"born", emitter.born}, {"mostAlive", emitter.mostAlive}});
+  }
+  return json;
+}
+
 Json toJson(const PackSummary& pack) {
   Json json;
   json["pack"] = pack.path;
   json["fileBytes"] = pack.fileBytes;
   json["disk"]["tables"] = pack.tableBytes;
+  json["disk"]["effects"] = pack.effectBytes;  // part of the tables
   json["disk"]["pages"] = pack.storedPageBytes;
   json["pages"]["count"] = pack.pageCount;
   json["pages"]["rawBytes"] = pack.rawPageBytes;
@@ -84,6 +98,8 @@ Json toJson(const PackSummary& pack) {
   json["info"] = pack.infoJson.empty() ? Json(nullptr) : info.is_discarded() ? Json(pack.infoJson) : info;
   json["volumes"] = Json::array();
   for (const VolumeSummary& volume : pack.volumes) json["volumes"].push_back(toJson(volume));
+  json["effects"] = Json::array();
+  for (const EffectSummary& effect : pack.effects) json["effects"].push_back(toJson(effect));
   return json;
 }
 
@@ -156,6 +172,14 @@ void printLargestFrame(const VolumeSummary& volume) {
   fmt::print("\n  Largest frame on the GPU: {}, {} ({})\n", number, size(largest.total()), kinds);
 }
 
+void printEffect(const EffectSummary& effect) {
+  fmt::print("\n{}: effect of {:g} s{}, at most {} particles alive\n", effect.name, effect.duration,
+             effect.loop ? ", again and again" : "", effect.mostAlive);
+  for (const EmitterSummary& emitter : effect.emitters) {
+    fmt::print("  {}: {} particles in a run, at most {} alive\n", emitter.name, emitter.born, emitter.mostAlive);
+  }
+}
+
 void printText(const PackSummary& pack) {
   fmt::print("{}: {} (pages {}, {} when unpacked; tables {})\n", pack.path, size(pack.fileBytes),
              size(pack.storedPageBytes), size(pack.rawPageBytes), size(pack.tableBytes));
@@ -174,6 +198,8 @@ void printText(const PackSummary& pack) {
     for (const GridSummary& grid : volume.grids) printGrid(grid);
     printLargestFrame(volume);
   }
+  for (const EffectSummary& effect : pack.effects) printEffect(effect);
+  if (!pack.effects.empty()) fmt::print("\nEffects: {} on disk\n", size(pack.effectBytes));
 }
 
 int runInfo(const std::string& path, bool json) {

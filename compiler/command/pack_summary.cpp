@@ -2,6 +2,7 @@
 
 #include <cstring>
 #include <limits>
+#include <span>
 
 #include "billow/format/brick.h"
 #include "billow/format/psnr.h"
@@ -50,6 +51,22 @@ VolumeSummary summariseVolume(const format::Pack& pack, const format::VolumeReco
   return summary;
 }
 
+EffectSummary summariseEffect(const format::Pack& pack, const format::EffectRecord& effect) {
+  const format::EffectTables& tables = pack.effects();
+  EffectSummary summary;
+  summary.name = pack.string(effect.name);
+  summary.duration = static_cast<double>(effect.duration);
+  summary.loop = (effect.flags & format::kEffectLoop) != 0;
+  summary.mostAlive = format::mostAlive(tables, effect);
+  for (std::uint32_t e = 0; e < effect.emitterCount; ++e) {
+    const format::EmitterRecord& emitter = tables.emitters[effect.firstEmitter + e];
+    const auto spans = std::span(tables.spans).subspan(emitter.firstSpan, emitter.spanCount);
+    summary.emitters.push_back({std::string(pack.string(emitter.name)), spans.back().first + spans.back().count,
+                                format::mostAlive(emitter, spans, effect.duration, summary.loop)});
+  }
+  return summary;
+}
+
 std::optional<format::Issue> countEncodings(const format::Pack& pack, PackSummary& summary) {
   for (std::uint32_t p = 0; p < pack.pages().size(); ++p) {
     const format::PageRecord& record = pack.pages()[p];
@@ -89,6 +106,10 @@ format::Result<PackSummary> summarise(const std::string& path) {
   if (!info) return tl::make_unexpected(info.error());
   summary.infoJson = std::move(*info);
   for (const format::VolumeRecord& volume : pack->volumes()) summary.volumes.push_back(summariseVolume(*pack, volume));
+  for (const format::EffectRecord& effect : pack->effects().effects) {
+    summary.effects.push_back(summariseEffect(*pack, effect));
+  }
+  summary.effectBytes = format::effectBytes(pack->effects());
   return summary;
 }
 

@@ -38,6 +38,20 @@ struct VolumeSummary {
   std::vector<GridSummary> grids;
 };
 
+struct EmitterSummary {
+  std::string name;
+  std::uint64_t born = 0;  // in one run of the effect
+  std::uint64_t mostAlive = 0;
+};
+
+struct EffectSummary {
+  std::string name;
+  double duration = 0;  // seconds
+  bool loop = false;
+  std::uint64_t mostAlive = 0;
+  std::vector<EmitterSummary> emitters;
+};
+
 struct PackSummary {
   std::string path;
   std::uint64_t fileBytes = 0;
@@ -50,6 +64,8 @@ struct PackSummary {
   std::array<std::uint64_t, format::kEncodingCount> encodings{};  // stored Node3s by encoding
   std::string infoJson;
   std::vector<VolumeSummary> volumes;
+  std::vector<EffectSummary> effects;
+  std::uint64_t effectBytes = 0;  // of all tables of effects; part of tableBytes
 };
 
 // Reads every page, to count encodings.

@@ -2,6 +2,7 @@
 
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -14,15 +15,15 @@ namespace {
 
 // The rename at the end would put the pack in the source's place.
 void refuseToReplaceInputs(const Plan& plan, const std::string& output) {
+  const auto check = [&](const std::string& file) {
+    std::error_code absent;
+    if (!std::filesystem::equivalent(file, output, absent)) return;
+    throw Error(Fault::commandLine, output + ": is an input of this compile; give the pack another name");
+  };
   for (const PlannedVolume& volume : plan.volumes) {
-    for (const PlannedFrame& frame : volume.frames) {
-      for (const std::string& file : frame.files) {
-        std::error_code absent;
-        if (!std::filesystem::equivalent(file, output, absent)) continue;
-        throw Error(Fault::commandLine, output + ": is an input of this compile; give the pack another name");
-      }
-    }
+    for (const PlannedFrame& frame : volume.frames) std::for_each(frame.files.begin(), frame.files.end(), check);
   }
+  for (const EffectDescription& effect : plan.effects) check(effect.file);
 }
 
 std::unique_ptr<WritePass> writeAtQuality(const std::string& output, const CompileOptions& options, const Plan& plan,
@@ -40,6 +41,9 @@ CompileReport compile(const std::vector<std::string>& inputs, const std::string&
   if (options.threads != 0) limit.emplace(tbb::global_control::max_allowed_parallelism, options.threads);
   const Plan plan = planInputs(inputs, options.import, warn);
   refuseToReplaceInputs(plan, output);
+  if (options.budget.any() && plan.volumes.empty()) {
+    throw Error(Fault::commandLine, "a budget needs volumes to spend it on; there are only effects");
+  }
   const std::unique_ptr<WritePass> pass =
       options.budget.any() ? fitBudget(output, options, plan, warn) : writeAtQuality(output, options, plan, warn);
   pass->commit();

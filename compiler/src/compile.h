@@ -54,8 +54,16 @@ struct GridReport {
   std::uint64_t largestFrameGpuBytes = 0;
 };
 
+struct EffectReport {
+  std::string name;
+  std::uint32_t emitters = 0;
+  std::uint64_t mostAlive = 0;  // format::mostAlive
+};
+
 struct CompileReport {
   std::vector<GridReport> grids;
+  std::vector<EffectReport> effects;
+  std::uint64_t effectBytes = 0;  // of all, on disk
   std::size_t frames = 0;
   std::uint64_t fileBytes = 0;
   std::uint64_t gpuBytes = 0;  // format::packGpuBytes

@@ -15,6 +15,7 @@
 
 #include "billow/format/brick.h"
 #include "billow/format/layout.h"
+#include "effect/description.h"
 
 namespace billow::compiler {
 
@@ -75,9 +76,11 @@ struct PlannedVolume {
 
 struct Plan {
   std::vector<PlannedVolume> volumes;
+  std::vector<EffectDescription> effects;
 };
 
-// `inputs` as on the command line: files, directories, globs, name_####.vdb, name_%04d.vdb, or one *.json manifest.
+// `inputs` as on the command line: files, directories, globs, name_####.vdb, name_%04d.vdb, or one *.json manifest;
+// and *.effect.json beside any of them.
 // Throws Error.
 Plan planInputs(const std::vector<std::string>& inputs, const ImportOptions& options, const Warn& warn);
 

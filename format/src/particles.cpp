@@ -275,6 +275,12 @@ std::uint64_t bornWithin(const SpawnSpan& span, double from, double to) {
 
 }  // namespace
 
+std::uint64_t effectBytes(const EffectTables& tables) {
+  const auto bytes = [](const auto& records) { return std::as_bytes(std::span(records)).size(); };
+  return bytes(tables.effects) + bytes(tables.emitters) + bytes(tables.spans) + bytes(tables.materials) +
+         bytes(tables.curves) + bytes(tables.ramps) + bytes(tables.maps);
+}
+
 float sampleCurve(const CurveRow& row, float x) {
   const float at = std::clamp(x, 0.0f, 1.0f) * static_cast<float>(kCurveSamples - 1);
   const std::size_t index = std::min<std::size_t>(static_cast<std::size_t>(at), kCurveSamples - 2);

@@ -87,24 +87,36 @@ VolumeRequest readVolume(const Value& node, const std::filesystem::path& folder,
   return volume;
 }
 
-std::vector<VolumeRequest> readVolumes(const Value& root, const std::filesystem::path& folder,
+std::vector<VolumeRequest> readVolumes(const Value& list, const std::filesystem::path& folder,
                                        const ImportOptions& options) {
-  root.requireKeys({"$schema", "volumes"});
   std::vector<VolumeRequest> volumes;
   std::set<std::string> names;
-  for (const Value& item : root.at("volumes").items("a list of volumes")) {
+  for (const Value& item : list.items("a list of volumes")) {
     volumes.push_back(readVolume(item, folder, options));
     if (!names.insert(volumes.back().name).second) item.at("name").fail("a name that no other volume has");
   }
   return volumes;
 }
 
+Manifest readRoot(const Value& root, const std::filesystem::path& folder, const ImportOptions& options) {
+  root.requireKeys({"$schema", "volumes", "effects"});
+  Manifest manifest;
+  const auto volumes = root.find("volumes"), effects = root.find("effects");
+  if (!volumes && !effects) root.fail("an object with \"volumes\", \"effects\" or both");
+  if (volumes) manifest.volumes = readVolumes(*volumes, folder, options);
+  if (!effects) return manifest;
+  for (const Value& file : effects->items("a list of *.effect.json files")) {
+    manifest.effects.push_back((folder / file.text("a *.effect.json file")).string());
+  }
+  return manifest;
+}
+
 }  // namespace
 
-std::vector<VolumeRequest> readManifest(const std::string& path, const ImportOptions& options) {
+Manifest readManifest(const std::string& path, const ImportOptions& options) {
   try {
     const json::Document document(path);
-    return readVolumes(document.root(), std::filesystem::path(path).parent_path(), options);
+    return readRoot(document.root(), std::filesystem::path(path).parent_path(), options);
   } catch (const json::FileError& error) {
     throw Error(Fault::file, error.what());
   } catch (const json::Error& error) {

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "billow/format/text.h"
+#include "effect/read.h"
 #include "import/inputs.h"
 #include "import/roles.h"
 #include "import/vdb_file.h"
@@ -252,19 +253,45 @@ Planned planVolume(const VolumeRequest& request, const Warn& warn) {
   return planned;
 }
 
+bool isEffect(const std::string& input) {
+  return input.ends_with(".effect.json");
+}
+
 bool isManifest(const std::string& input) {
   return std::filesystem::path(input).extension() == ".json";
 }
 
-std::vector<VolumeRequest> requestsOf(const std::vector<std::string>& inputs, const ImportOptions& options) {
-  if (std::none_of(inputs.begin(), inputs.end(), isManifest)) {
-    VolumeRequest request;
-    request.inputs = inputs;
-    request.options = options;
-    return {request};
+Manifest requestsOf(const std::vector<std::string>& inputs, const ImportOptions& options) {
+  std::vector<std::string> effects = inputs;
+  const auto others = std::stable_partition(effects.begin(), effects.end(), isEffect);
+  Manifest requests;
+  VolumeRequest request;
+  request.options = options;
+  request.inputs.assign(others, effects.end());
+  effects.erase(others, effects.end());
+  if (std::any_of(request.inputs.begin(), request.inputs.end(), isManifest)) {
+    if (request.inputs.size() > 1) {
+      throw Error(Fault::commandLine, "a manifest must be the only input but for effects");
+    }
+    requests = readManifest(request.inputs.front(), options);
+  } else if (!request.inputs.empty()) {
+    requests.volumes.push_back(request);
   }
-  if (inputs.size() > 1) throw Error(Fault::commandLine, "a manifest must be the only input");
-  return readManifest(inputs.front(), options);
+  requests.effects.insert(requests.effects.end(), effects.begin(), effects.end());
+  return requests;
+}
+
+std::vector<EffectDescription> planEffects(const std::vector<std::string>& files) {
+  std::vector<EffectDescription> effects;
+  for (const std::string& file : files) {
+    effects.push_back(readEffect(file));
+    for (std::size_t i = 0; i + 1 < effects.size(); ++i) {
+      if (effects[i].name != effects.back().name) continue;
+      throw Error(Fault::input,
+                  fmt::format("{}: effect '{}' is also in {}", file, effects.back().name, effects[i].file));
+    }
+  }
+  return effects;
 }
 
 // Every --grid must name a grid of some volume.
@@ -286,9 +313,10 @@ void checkSelection(const std::vector<Planned>& volumes, const std::vector<std::
 }  // namespace
 
 Plan planInputs(const std::vector<std::string>& inputs, const ImportOptions& options, const Warn& warn) {
+  const Manifest requests = requestsOf(inputs, options);
   std::vector<Planned> volumes;
   std::set<std::string> names;
-  for (const VolumeRequest& request : requestsOf(inputs, options)) {
+  for (const VolumeRequest& request : requests.volumes) {
     volumes.push_back(planVolume(request, warn));
     if (!names.insert(volumes.back().volume.name).second) {
       throw Error(Fault::input, fmt::format("two volumes are named '{}'", volumes.back().volume.name));
@@ -296,6 +324,7 @@ Plan planInputs(const std::vector<std::string>& inputs, const ImportOptions& opt
   }
   checkSelection(volumes, options.grids);
   Plan plan;
+  plan.effects = planEffects(requests.effects);
   for (Planned& planned : volumes) {
     if (planned.volume.grids.empty()) {
       throw Error(Fault::input, fmt::format("volume '{}': none of the grids asked for is in it; there is: {}",

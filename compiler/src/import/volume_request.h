@@ -25,10 +25,15 @@ struct VolumeRequest {
   format::LookRecord look{};
 };
 
-// Reads a manifest (spec/manifest.schema.json); inputs come out relative to the manifest's folder. What the command
+struct Manifest {
+  std::vector<VolumeRequest> volumes;
+  std::vector<std::string> effects;  // files
+};
+
+// Reads a manifest (spec/manifest.schema.json); files come out relative to the manifest's folder. What the command
 // line says (frames, fps, missing) goes before what the manifest says. Throws Error: Fault::file when it cannot be
 // read, Fault::input naming the JSON path, the value found and what was expected.
-std::vector<VolumeRequest> readManifest(const std::string& path, const ImportOptions& options);
+Manifest readManifest(const std::string& path, const ImportOptions& options);
 
 }  // namespace billow::compiler
 

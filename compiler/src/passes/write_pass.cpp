@@ -7,6 +7,7 @@
 #include "billow/format/gpu_size.h"
 #include "billow/format/psnr.h"
 #include "choose/decide.h"
+#include "effect/bake_effect.h"
 
 namespace billow::compiler {
 namespace {
@@ -25,10 +26,11 @@ std::string settingsJson(const CompileOptions& options) {
   return info.dump(2) + "\n";
 }
 
-format::PackWriter::Options writerOptions(const CompileOptions& options) {
+format::PackWriter::Options writerOptions(const CompileOptions& options, const Plan& plan) {
   format::PackWriter::Options result;
   result.compression = options.compression;
   result.threads = options.threads;
+  result.effects = !plan.effects.empty();
   return result;
 }
 
@@ -45,8 +47,14 @@ format::GridFrame absent() {
 }  // namespace
 
 WritePass::WritePass(const std::string& output, const CompileOptions& options, const Plan& plan)
-    : options_(options), plan_(plan), writer_(output, writerOptions(options)), sharer_(writer_) {
+    : options_(options), plan_(plan), writer_(output, writerOptions(options, plan)), sharer_(writer_) {
   for (const PlannedVolume& volume : plan.volumes) addVolume(volume);
+  bakeEffects(plan.effects, tables_);
+  for (std::size_t i = 0; i < plan.effects.size(); ++i) {
+    const format::EffectRecord& effect = tables_.effects.effects[i];
+    report_.effects.push_back({plan.effects[i].name, effect.emitterCount, mostAlive(tables_.effects, effect)});
+  }
+  report_.effectBytes = effectBytes(tables_.effects);
 }
 
 void WritePass::addVolume(const PlannedVolume& volume) {

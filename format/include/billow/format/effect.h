@@ -116,6 +116,9 @@ struct EffectTables {
   bool empty() const { return effects.empty(); }
 };
 
+// Bytes of all the tables, on disk as in memory.
+std::uint64_t effectBytes(const EffectTables& tables);
+
 // Linear between a row's samples; x is clamped to [0, 1].
 float sampleCurve(const CurveRow& row, float x);
 

@@ -1,0 +1,50 @@
+#include "extract_effect.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <vector>
+
+#include "effect/rasterise.h"
+#include "import/vdb_write.h"
+#include "import_options.h"
+
+namespace billow::command {
+namespace {
+
+using compiler::Error;
+using compiler::Fault;
+
+std::uint32_t findEffect(const format::Pack& pack, const std::string& name) {
+  const auto& effects = pack.effects().effects;
+  std::vector<std::string_view> names;
+  for (std::uint32_t i = 0; i < effects.size(); ++i) {
+    names.push_back(pack.string(effects[i].name));
+    if (names.back() == name) return i;
+  }
+  throw Error(Fault::commandLine, fmt::format("--effect {}: no such effect; there is: {}", name,
+                                              names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
+}
+
+}  // namespace
+
+void extractEffect(const format::Pack& pack, const EffectArguments& arguments, const std::string& output) {
+  if (!arguments.time || !arguments.voxelSize) {
+    throw Error(Fault::commandLine, "--effect needs --time and --voxel-size");
+  }
+  const std::uint32_t effect = findEffect(pack, arguments.effect);
+  const auto particles = format::particlesAt(pack.effects(), effect, *arguments.time);
+  const auto grids = compiler::rasterise(pack.effects(), particles, *arguments.voxelSize);
+  if (grids.density.leaves.empty()) {
+    printWarning(fmt::format("effect '{}' is empty {} s after its begin; {} holds empty grids", arguments.effect,
+                             *arguments.time, output));
+  }
+  const auto& colour = grids.colour;
+  const auto& emission = grids.emission;
+  const std::vector<compiler::VdbOutput> outputs = {{"density", true, {&grids.density, nullptr, nullptr}},
+                                                    {"color", false, {&colour[0], &colour[1], &colour[2]}},
+                                                    {"emission", false, {&emission[0], &emission[1], &emission[2]}}};
+  compiler::writeVdb(output, outputs);
+}
+
+}  // namespace billow::command

@@ -1,0 +1,127 @@
+#include "effect/bake_effect.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "effect/noise_map.h"
+
+namespace billow::compiler {
+namespace {
+
+class Baker {
+ public:
+  explicit Baker(format::PackTables& tables) : tables_(tables), effects_(tables.effects) {}
+
+  void add(const EffectDescription& effect) {
+    format::EffectRecord record{};
+    record.name = tables_.addString(effect.name);
+    record.firstEmitter = static_cast<std::uint32_t>(effects_.emitters.size());
+    record.emitterCount = static_cast<std::uint32_t>(effect.emitters.size());
+    record.flags = effect.flags;
+    record.seed = effect.seed;
+    record.duration = effect.duration;
+    for (const EmitterDescription& emitter : effect.emitters) addEmitter(emitter, effect.duration);
+    effects_.effects.push_back(record);
+  }
+
+ private:
+  void addEmitter(const EmitterDescription& emitter, float duration) {
+    format::EmitterRecord record = emitter.record;
+    record.name = tables_.addString(emitter.name);
+    record.firstSpan = static_cast<std::uint32_t>(effects_.spans.size());
+    record.spanCount = static_cast<std::uint32_t>(emitter.spans.size());
+    effects_.spans.insert(effects_.spans.end(), emitter.spans.begin(), emitter.spans.end());
+    record.positionRow = format::kNoRow;
+    if (emitter.position.times.size() == 1) {
+      for (std::size_t i = 0; i < 3; ++i) record.position[i] = static_cast<float>(emitter.position.values[0][i]);
+    } else if (!emitter.position.empty()) {
+      record.positionRow = rows(emitter.position, 3, static_cast<double>(duration));
+    }
+    record.radiusRow = rows(emitter.radius, 1, 1);
+    record.opacityRow = rows(emitter.opacity, 1, 1);
+    record.diffuseRow = rows(emitter.diffuse, 3, 1);
+    record.emissionRow = rows(emitter.emission, 3, 1);
+    record.rotationRow = rows(emitter.rotation, 1, 1);
+    record.displacementRow = rows(emitter.displacement, 1, 1);
+    record.firstMap = emitter.map ? maps(*emitter.map) : format::kNoMap;
+    record.mapCount = emitter.map ? emitter.map->frames : 0;
+    record.material = material(emitter);
+    effects_.emitters.push_back(record);
+  }
+
+  // The first of `count` consecutive rows, one a component, over [0, end].
+  std::uint32_t rows(const Keys& keys, std::size_t count, double end) {
+    if (keys.empty()) return format::kNoRow;
+    std::vector<format::CurveRow> wanted(count);
+    for (std::uint32_t i = 0; i < format::kCurveSamples; ++i) {
+      const auto value = keys.at(end * i / (format::kCurveSamples - 1));
+      for (std::size_t c = 0; c < count; ++c) wanted[c].values[i] = static_cast<float>(value[c]);
+    }
+    return shared(effects_.curves, wanted);
+  }
+
+  std::uint32_t ramp(const std::vector<RampRow>& description) {
+    if (description.empty()) return format::kNoRow;
+    format::RampTable table{};
+    for (std::uint32_t a = 0; a < format::kRampAges; ++a) {
+      for (std::uint32_t r = 0; r < format::kRampRadii; ++r) {
+        const auto colour = rampColour(description, static_cast<double>(r) / (format::kRampRadii - 1),
+                                       static_cast<double>(a) / (format::kRampAges - 1));
+        for (std::size_t c = 0; c < 3; ++c) table.values[a][r][c] = static_cast<float>(colour[c]);
+      }
+    }
+    return shared(effects_.ramps, std::vector{table});
+  }
+
+  static std::array<double, 3> rampColour(const std::vector<RampRow>& ramp, double radius, double age) {
+    Keys ages;
+    for (const RampRow& row : ramp) {
+      ages.times.push_back(row.age);
+      ages.values.push_back(row.colour.at(radius));
+    }
+    return ages.at(age);
+  }
+
+  std::uint32_t maps(const NoiseMap& map) {
+    for (const auto& [known, first] : madeMaps_) {
+      if (known == map) return first;
+    }
+    const auto first = static_cast<std::uint32_t>(effects_.maps.size());
+    const auto made = makeNoiseMaps(map);
+    effects_.maps.insert(effects_.maps.end(), made.begin(), made.end());
+    madeMaps_.emplace_back(map, first);
+    return first;
+  }
+
+  std::uint32_t material(const EmitterDescription& emitter) {
+    format::ParticleMaterial material = emitter.material;
+    material.profileRow = rows(emitter.profile, 1, 1);
+    material.diffuseRamp = ramp(emitter.diffuseRamp);
+    material.emissionRamp = ramp(emitter.emissionRamp);
+    return shared(effects_.materials, std::vector{material});
+  }
+
+  // Where these records stand in the table, one after another; they are appended where they don't.
+  template <class T>
+  static std::uint32_t shared(std::vector<T>& table, const std::vector<T>& records) {
+    const auto equal = [](const T& a, const T& b) { return std::memcmp(&a, &b, sizeof(T)) == 0; };
+    auto at = std::search(table.begin(), table.end(), records.begin(), records.end(), equal);
+    const auto first = static_cast<std::uint32_t>(at - table.begin());
+    if (at == table.end()) table.insert(table.end(), records.begin(), records.end());
+    return first;
+  }
+
+  format::PackTables& tables_;
+  format::EffectTables& effects_;
+  std::vector<std::pair<NoiseMap, std::uint32_t>> madeMaps_;
+};
+
+}  // namespace
+
+void bakeEffects(std::span<const EffectDescription> effects, format::PackTables& tables) {
+  Baker baker(tables);
+  for (const EffectDescription& effect : effects) baker.add(effect);
+}
+
+}  // namespace billow::compiler

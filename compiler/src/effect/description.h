@@ -1,0 +1,64 @@
+// What an effect's description says (spec/effects.md); read.h reads it.
+#ifndef BILLOW_COMPILER_EFFECT_DESCRIPTION_H
+#define BILLOW_COMPILER_EFFECT_DESCRIPTION_H
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "billow/format/effect.h"
+
+namespace billow::compiler {
+
+// Keys of a curve, linear between them, constant before the first and after the last. A number is [0] of a value.
+struct Keys {
+  std::vector<double> times;  // strictly ascending
+  std::vector<std::array<double, 3>> values;
+
+  bool empty() const { return times.empty(); }
+  std::array<double, 3> at(double time) const;
+  // Of the first component, from the first key's time to `time`, which is not before it.
+  double integral(double time) const;
+};
+
+struct RampRow {
+  double age;   // in [0, 1]
+  Keys colour;  // over the radius
+};
+
+enum class NoiseKind { fbm, ridged, worley };
+
+struct NoiseMap {
+  NoiseKind kind = NoiseKind::fbm;
+  std::uint32_t octaves = 4;
+  double frequency = 2;  // periods along the unit sphere's radius
+  std::uint32_t seed = 0;
+  std::uint32_t frames = 1;  // that follow one another in a circle
+  bool operator==(const NoiseMap&) const = default;
+};
+
+struct EmitterDescription {
+  std::string name;
+  format::EmitterRecord record{};  // its numbers; what refers to tables comes with the tables
+  std::vector<format::SpawnSpan> spans;
+  // Over the effect's time (position) or a particle's life; empty: none.
+  Keys position, radius, opacity, diffuse, emission, rotation, displacement;
+  format::ParticleMaterial material{};  // likewise
+  Keys profile;
+  std::vector<RampRow> diffuseRamp, emissionRamp;
+  std::optional<NoiseMap> map;
+};
+
+struct EffectDescription {
+  std::string file;
+  std::string name;
+  std::uint32_t seed = 0;
+  float duration = 1;
+  std::uint32_t flags = 0;  // format::kEffectLoop, kEffectPrewarm
+  std::vector<EmitterDescription> emitters;
+};
+
+}  // namespace billow::compiler
+
+#endif  // BILLOW_COMPILER_EFFECT_DESCRIPTION_H

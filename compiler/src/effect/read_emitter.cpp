@@ -1,0 +1,141 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <string>
+
+#include "billow/format/exact_math.h"
+#include "effect/read.h"
+
+namespace billow::compiler {
+namespace {
+
+using json::Range;
+using json::Value;
+
+constexpr double kMost = static_cast<double>(format::kMaxMagnitude);
+constexpr Range kAny{-kMost, kMost};
+constexpr Range kPositive{0, kMost};
+constexpr std::size_t kMostBursts = 64;
+constexpr int kRateIntervals = 63;
+static_assert(kMostBursts + kRateIntervals <= format::kMaxSpans);
+
+void readVector(const Value& value, float (&into)[3]) {
+  const auto numbers = value.singles<3>(kAny);
+  std::copy(numbers.begin(), numbers.end(), into);
+}
+
+void readShape(const Value& value, format::EmitterRecord& record) {
+  const std::size_t type = value.at("type").word({"point", "sphere", "box"});
+  record.shape = static_cast<std::uint32_t>(type);
+  switch (static_cast<format::EmitterShape>(type)) {
+    case format::EmitterShape::point:
+      return value.requireKeys({"type"});
+    case format::EmitterShape::sphere:
+      value.requireKeys({"type", "radius", "hollow"});
+      record.extent[0] = value.at("radius").single(kPositive);
+      if (const auto hollow = value.find("hollow")) record.extent[1] = hollow->single({0, 1});
+      return;
+    case format::EmitterShape::box: {
+      value.requireKeys({"type", "halfSides"});
+      const auto sides = value.at("halfSides").singles<3>(kPositive);
+      std::copy(sides.begin(), sides.end(), record.extent);
+    }
+  }
+}
+
+// The vector at unit length.
+void readDirection(const Value& value, float (&into)[3]) {
+  const auto v = value.numbers<3>(kAny);
+  const double length = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+  if (!(length > 1e-6)) value.fail("a direction, which is not 0");
+  for (std::size_t i = 0; i < 3; ++i) into[i] = static_cast<float>(v[i] / length);
+}
+
+void readVelocity(const Value& value, format::EmitterRecord& record) {
+  value.requireKeys({"direction", "speed", "spread"});
+  if (const auto direction = value.find("direction")) readDirection(*direction, record.direction);
+  readSpan(value.at("speed"), kAny, record.speed);
+  if (const auto spread = value.find("spread")) {
+    record.spreadCosine = static_cast<float>(format::sineCosine(spread->number({0, 180}) / 360).cosine);
+  }
+}
+
+void readForces(const Value& value, format::EmitterRecord& record) {
+  value.requireKeys({"gravity", "drag", "wind"});
+  if (const auto gravity = value.find("gravity")) readVector(*gravity, record.gravity);
+  if (const auto drag = value.find("drag")) record.drag = drag->single({0, static_cast<double>(format::kMaxDrag)});
+  const auto wind = value.find("wind");
+  if (!wind) return;
+  readVector(*wind, record.wind);
+  if (!(record.drag > 0)) wind->fail("a drag above 0 beside it: without drag, wind moves nothing");
+}
+
+void addSpan(double begin, double end, std::uint64_t count, EmitterDescription& emitter, const Value& cause) {
+  if (count == 0) return;
+  const std::uint64_t before = emitter.spans.empty() ? 0 : emitter.spans.back().first + emitter.spans.back().count;
+  if (before + count > format::kMaxCycleParticles) {
+    cause.fail(fmt::format("no more than {} particles in one run of the effect; there are {} so far",
+                           format::kMaxCycleParticles, before + count));
+  }
+  emitter.spans.push_back({static_cast<float>(begin), static_cast<float>(end), static_cast<std::uint32_t>(before),
+                           static_cast<std::uint32_t>(count)});
+}
+
+std::uint64_t rounded(double count) {
+  return static_cast<std::uint64_t>(std::floor(count + 0.5));
+}
+
+// A constant rate is one span. A curve becomes intervals of equal length, and the number born in each is that by which
+// the rounded integral grows, so that nothing is lost between them.
+void readRate(const Value& value, double duration, EmitterDescription& emitter) {
+  const Keys rate = readCurve(value, {0, duration}, kPositive);
+  if (!value.isArray()) return addSpan(0, duration, rounded(rate.values[0][0] * duration), emitter, value);
+  const double before = rate.values[0][0] * rate.times[0];
+  const auto born = [&](double time) {
+    return time < rate.times[0] ? rate.values[0][0] * time : before + rate.integral(time);
+  };
+  std::uint64_t last = 0;
+  for (int i = 0; i < kRateIntervals; ++i) {
+    const double end = duration * (i + 1) / kRateIntervals;
+    const std::uint64_t count = rounded(born(end));
+    addSpan(duration * i / kRateIntervals, end, count - last, emitter, value);
+    last = count;
+  }
+}
+
+void readBursts(const Value& value, double duration, EmitterDescription& emitter) {
+  const auto bursts = value.items("a list of bursts");
+  if (bursts.size() > kMostBursts) value.fail(fmt::format("at most {} bursts", kMostBursts));
+  for (const Value& burst : bursts) {
+    burst.requireKeys({"time", "count"});
+    const double time = burst.at("time").number({0, duration});
+    const Value count = burst.at("count");
+    addSpan(time, time, static_cast<std::uint64_t>(count.integer(1, format::kMaxCycleParticles)), emitter, count);
+  }
+}
+
+}  // namespace
+
+EmitterDescription readEmitter(const Value& value, float duration) {
+  value.requireKeys({"name", "shape", "position", "rate", "bursts", "lifetime", "velocity", "inheritedVelocity",
+                     "forces", "primitive"});
+  EmitterDescription emitter;
+  format::EmitterRecord& record = emitter.record;
+  const double seconds = static_cast<double>(duration);
+  emitter.name = value.at("name").name("an emitter's name");
+  record.direction[1] = 1;
+  record.spreadCosine = 1;
+  if (const auto shape = value.find("shape")) readShape(*shape, record);
+  if (const auto position = value.find("position")) emitter.position = readVectorCurve(*position, {0, seconds}, kAny);
+  if (const auto rate = value.find("rate")) readRate(*rate, seconds, emitter);
+  if (const auto bursts = value.find("bursts")) readBursts(*bursts, seconds, emitter);
+  if (emitter.spans.empty()) value.fail("a rate or bursts by which at least one particle is born");
+  readSpan(value.at("lifetime"), {0.001, static_cast<double>(format::kMaxLifetime)}, record.lifetime);
+  if (const auto velocity = value.find("velocity")) readVelocity(*velocity, record);
+  if (const auto share = value.find("inheritedVelocity")) record.inheritance = share->single({-10, 10});
+  if (const auto forces = value.find("forces")) readForces(*forces, record);
+  readPrimitive(value.at("primitive"), emitter);
+  return emitter;
+}
+
+}  // namespace billow::compiler

@@ -1,0 +1,199 @@
+#include <algorithm>
+#include <cmath>
+
+#include "effect/black_body.h"
+#include "effect/read.h"
+
+namespace billow::compiler {
+namespace {
+
+using json::Range;
+using json::Value;
+
+constexpr double kMost = static_cast<double>(format::kMaxMagnitude);
+constexpr Range kLife{0, 1};
+constexpr Range kShare{0, 1};
+constexpr Range kPositive{0, kMost};
+constexpr Range kTurns{-10000, 10000};
+constexpr double kMostDisplacement = 0.95;  // as the format has it
+
+void setColour(const std::array<double, 3>& colour, float (&into)[3]) {
+  for (std::size_t i = 0; i < 3; ++i) into[i] = static_cast<float>(colour[i]);
+}
+
+// A constant goes into the record, a curve into rows with the record's factor 1.
+void takeCurve(const Keys& keys, float& constant, Keys& row) {
+  if (keys.times.size() == 1) {
+    constant = static_cast<float>(keys.values[0][0]);
+  } else {
+    constant = 1;
+    row = keys;
+  }
+}
+
+// [{"age": A, "stops": [[radius, [r, g, b]], ...]}, ...]
+std::vector<RampRow> readRamp(const Value& value, const Range& colours) {
+  std::vector<RampRow> ramp;
+  for (const Value& row : value.items("a list of rows with age and stops")) {
+    row.requireKeys({"age", "stops"});
+    const double age = row.at("age").number(kLife);
+    if (!ramp.empty() && age <= ramp.back().age) row.at("age").fail("an age above that of the row before");
+    ramp.push_back({age, readVectorCurve(row.at("stops"), kShare, colours)});
+  }
+  if (ramp.size() > format::kRampAges) value.fail("at most 16 rows");
+  return ramp;
+}
+
+void readDiffuse(const Value& value, EmitterDescription& emitter) {
+  value.requireKeys({"colour", "ramp", "occlusion"});
+  if (const auto colour = value.find("colour")) {
+    const Keys keys = readVectorCurve(*colour, kLife, kShare);
+    setColour(keys.times.size() == 1 ? keys.values[0] : std::array<double, 3>{1, 1, 1}, emitter.record.diffuse);
+    if (keys.times.size() > 1) emitter.diffuse = keys;
+  }
+  if (const auto ramp = value.find("ramp")) emitter.diffuseRamp = readRamp(*ramp, kShare);
+  if (const auto occlusion = value.find("occlusion")) emitter.material.occlusion = occlusion->single(kShare);
+}
+
+// Colour, strength and heat multiply; all are sampled into one curve, for products of lines are no lines.
+Keys emissionKeys(const Keys& colour, const Keys& strength, const Keys& temperature) {
+  double hottest = 0;
+  for (const auto& key : temperature.values) hottest = std::max(hottest, key[0]);
+  const double brightest = temperature.empty() ? 1 : largest(blackBody(hottest));
+  Keys keys;
+  const bool constant = colour.times.size() <= 1 && strength.times.size() <= 1 && temperature.times.size() <= 1;
+  const int samples = constant ? 1 : static_cast<int>(format::kCurveSamples);
+  for (int i = 0; i < samples; ++i) {
+    const double time = constant ? 0 : static_cast<double>(i) / (format::kCurveSamples - 1);
+    std::array<double, 3> product = colour.at(time);
+    const std::array<double, 3> heat =
+        temperature.empty() ? std::array<double, 3>{1, 1, 1} : blackBody(temperature.at(time)[0]);
+    for (std::size_t c = 0; c < 3; ++c) product[c] *= strength.at(time)[0] * heat[c] / brightest;
+    keys.times.push_back(time);
+    keys.values.push_back(product);
+  }
+  return keys;
+}
+
+void readEmission(const Value& value, EmitterDescription& emitter) {
+  value.requireKeys({"colour", "strength", "temperature", "ramp"});
+  constexpr Range kFactor{0, 1000};  // two of them and a ramp stay in range
+  Keys colour{{0}, {{1, 1, 1}}}, temperature;
+  if (const auto given = value.find("colour")) colour = readVectorCurve(*given, kLife, kFactor);
+  if (const auto given = value.find("temperature")) temperature = readCurve(*given, kLife, {500, 20000});
+  const Keys keys = emissionKeys(colour, readCurve(value.at("strength"), kLife, kFactor), temperature);
+  setColour(keys.times.size() == 1 ? keys.values[0] : std::array<double, 3>{1, 1, 1}, emitter.record.emission);
+  if (keys.times.size() > 1) emitter.emission = keys;
+  if (const auto ramp = value.find("ramp")) emitter.emissionRamp = readRamp(*ramp, kFactor);
+}
+
+void readRotation(const Value& value, EmitterDescription& emitter) {
+  value.requireKeys({"axis", "randomStart", "turns", "alongVelocity"});
+  format::EmitterRecord& record = emitter.record;
+  if (const auto axis = value.find("axis")) {
+    const auto v = axis->numbers<3>({-kMost, kMost});
+    const double length = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    if (!(length > 1e-6)) axis->fail("an axis, which is not 0");
+    for (std::size_t i = 0; i < 3; ++i) record.axis[i] = static_cast<float>(v[i] / length);
+  }
+  if (const auto start = value.find("randomStart"); start && start->boolean()) {
+    record.flags |= format::kEmitterRandomStart;
+  }
+  if (const auto along = value.find("alongVelocity"); along && along->boolean()) record.flags |= format::kEmitterAlign;
+  const auto turns = value.find("turns");
+  if (!turns) return;
+  emitter.rotation = readCurve(*turns, kLife, kTurns);
+  if (!turns->isArray()) emitter.rotation = {{0, 1}, {{0, 0, 0}, emitter.rotation.values[0]}};
+}
+
+void readNoise(const Value& value, EmitterDescription& emitter) {
+  value.requireKeys({"kind", "octaves", "frequency", "seed", "frames", "framesPerSecond"});
+  NoiseMap map;
+  map.kind = static_cast<NoiseKind>(value.at("kind").word({"fbm", "ridged", "worley"}));
+  if (const auto octaves = value.find("octaves")) map.octaves = static_cast<std::uint32_t>(octaves->integer(1, 8));
+  if (const auto frequency = value.find("frequency")) map.frequency = frequency->number({0.1, 64});
+  if (const auto seed = value.find("seed")) map.seed = static_cast<std::uint32_t>(seed->integer(0, 0xffffffff));
+  if (const auto frames = value.find("frames")) {
+    map.frames = static_cast<std::uint32_t>(frames->integer(1, format::kMaxAnimatedMaps));
+  }
+  if (const auto speed = value.find("framesPerSecond")) {
+    if (map.frames == 1) speed->fail("2 or more frames beside it");
+    emitter.record.mapsPerSecond = speed->single({-1000, 1000});
+  }
+  emitter.map = map;
+}
+
+void readDisplacement(const Value& value, EmitterDescription& emitter) {
+  value.requireKeys({"amount", "noise"});
+  const Keys amount = readCurve(value.at("amount"), kLife, {0, kMostDisplacement});
+  takeCurve(amount, emitter.record.displacement, emitter.displacement);
+  if (!emitter.displacement.empty()) {  // the record's factor is bounded too
+    emitter.record.displacement = static_cast<float>(kMostDisplacement);
+    for (auto& key : emitter.displacement.values) key[0] /= kMostDisplacement;
+  }
+  readNoise(value.at("noise"), emitter);
+}
+
+// So that the bounding sphere has the radius 1.
+void readProportions(const Value& primitive, format::EmitterRecord& record) {
+  const auto proportions = primitive.find("proportions");
+  if (record.kind == format::kKindSphere) {
+    if (proportions) proportions->fail("no proportions of a sphere; \"ellipsoid\" has them");
+    return;
+  }
+  if (!proportions) primitive.fail("\"proportions\": radii (ellipsoid), half axis (capsule) or half sides (box)");
+  const auto p = proportions->numbers<3>({0, 1000});
+  const double length = std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+  if (record.kind == format::kKindCapsule) {
+    if (!(length <= 0.95)) proportions->fail("a half axis of at most 0.95, as a share of the radius");
+    return setColour(p, record.proportions);
+  }
+  if (!(std::min({p[0], p[1], p[2]}) > 0)) proportions->fail("three numbers above 0");
+  const double whole = record.kind == format::kKindBox ? length : largest(p);
+  setColour({p[0] / whole, p[1] / whole, p[2] / whole}, record.proportions);
+}
+
+void readProfile(const Value& value, EmitterDescription& emitter) {
+  if (value.isArray()) {
+    emitter.material.profile = format::kProfileCurve;
+    emitter.profile = readCurve(value, kShare, kShare);
+    return;
+  }
+  emitter.material.profile = static_cast<std::uint32_t>(value.word({"constant", "radial"}));
+}
+
+void readDensity(const Value& value, EmitterDescription& emitter) {
+  value.requireKeys({"extinction", "opacity", "profile", "softness", "erosion"});
+  emitter.record.extinction = value.at("extinction").single(kPositive);
+  if (const auto opacity = value.find("opacity")) emitter.opacity = readCurve(*opacity, kLife, kPositive);
+  if (const auto profile = value.find("profile")) readProfile(*profile, emitter);
+  if (const auto softness = value.find("softness")) emitter.material.softness = softness->single({0.001, 1});
+  if (const auto erosion = value.find("erosion")) {
+    erosion->requireKeys({"amount", "frequency"});
+    emitter.material.erosion = erosion->at("amount").single(kShare);
+    emitter.material.erosionFrequency =
+        erosion->at("frequency").single({0.01, static_cast<double>(format::kMaxErosionFrequency)});
+  }
+}
+
+}  // namespace
+
+void readPrimitive(const Value& value, EmitterDescription& emitter) {
+  value.requireKeys({"kind", "proportions", "radius", "radiusOverLife", "density", "diffuse", "emission", "rotation",
+                     "displacement"});
+  format::EmitterRecord& record = emitter.record;
+  record.kind = static_cast<std::uint32_t>(value.at("kind").word({"sphere", "ellipsoid", "capsule", "box"}));
+  readProportions(value, record);
+  readSpan(value.at("radius"), kPositive, record.radius);
+  if (const auto curve = value.find("radiusOverLife")) emitter.radius = readCurve(*curve, kLife, {0, 1000});
+  emitter.material.softness = 0.25f;
+  emitter.material.erosionFrequency = 1;
+  std::fill_n(record.diffuse, 3, 0.8f);
+  readDensity(value.at("density"), emitter);
+  if (const auto diffuse = value.find("diffuse")) readDiffuse(*diffuse, emitter);
+  if (const auto emission = value.find("emission")) readEmission(*emission, emitter);
+  if (const auto rotation = value.find("rotation")) readRotation(*rotation, emitter);
+  if (const auto displacement = value.find("displacement")) readDisplacement(*displacement, emitter);
+}
+
+}  // namespace billow::compiler
