@@ -6,16 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <numeric>
+#include <memory>
 #include <random>
-#include <sstream>
 
-#include "../../format/src/page_coder/models.h"
-#include "../../format/src/page_coder/voxel_table.h"
+#include "../../format/src/page_coder/token_tables.h"
 #include "billow/format/pack.h"
 #include "page_builder.h"
 #include "sample_pack.h"
-#include "spec_document.h"
 
 namespace billow {
 namespace {
@@ -214,31 +211,58 @@ TEST(PageCodecModels, BitsStayPossible) {
   }
 }
 
-TEST(PageCodecSpec, TableIsThatOfTheCode) {
-  std::istringstream text(tests::readSpec("pagecodec.md"));
-  std::vector<std::uint32_t> numbers;
-  std::string line;
-  bool inside = false;
-  while (std::getline(text, line)) {
-    if (line.starts_with("| edge | level |")) inside = true;
-    if (line.empty()) inside = false;
-    if (!inside || line.find_first_of("0123456789") == std::string::npos) continue;
-    std::replace(line.begin(), line.end(), '|', ' ');
-    std::istringstream row(line);
-    std::uint32_t edge = 0, level = 0, size = 0;
-    if (!(row >> edge >> level)) continue;
-    EXPECT_EQ(edge * 13 + level, numbers.size() / kSymbols);
-    while (row >> size) numbers.push_back(size);
+// start[t] of spec/pagecodec.md, "Tables", for classes that give every token its own part of 1024.
+TEST(PageCodecModels, TablesComeBackAndCoverAllNumbers) {
+  tests::Random random(9);
+  const auto counts = std::make_unique<TokenCounts>();
+  for (std::uint32_t context = 0; context < kTokenContexts; ++context) {
+    const std::uint32_t tokens = random() % (kTokens + 1);
+    for (std::uint32_t i = 0; i < tokens; ++i) (*counts)[context * kTokens + i] = random() % (1u << random() % 20);
   }
-  ASSERT_EQ(numbers.size(), std::size_t{8 * 13 * 16});
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    EXPECT_EQ(numbers[i], kVoxelTable[i / 208][i / 16 % 13][i % 16]) << i;
+  const auto written = std::make_unique<TokenTables>();
+  const auto read = std::make_unique<TokenTables>();
+  Encoder encoder;
+  written->code(encoder, *counts);
+  const std::vector<std::byte> stored = encoder.finish();
+  const PaddedBytes padded(stored);
+  Decoder decoder(padded);
+  read->code(decoder, {});
+  EXPECT_TRUE(decoder.sound());
+  for (std::uint32_t context = 0; context < kTokenContexts; ++context) {
+    std::uint32_t next = 0;
+    for (std::uint32_t kind = context * kTokens; kind < (context + 1) * kTokens; ++kind) {
+      const auto [start, size] = read->intervals()[kind];
+      EXPECT_EQ(start, written->intervals()[kind].start);
+      ASSERT_EQ(start, next);
+      next = start + size;
+      if ((*counts)[kind] > 0) {
+        EXPECT_GE(size, 32);
+      }
+      for (std::uint32_t number = start; number < next; number += TokenTables::kSlotSize) {
+        const std::uint32_t slot = number / TokenTables::kSlotSize;
+        ASSERT_EQ(read->slots()[context * TokenTables::kSlots + slot], kind % kTokens);
+      }
+    }
+    EXPECT_EQ(next, kScale);
   }
-  for (std::size_t row = 0; row < numbers.size(); row += 16) {
-    EXPECT_EQ(std::accumulate(numbers.begin() + static_cast<std::ptrdiff_t>(row),
-                              numbers.begin() + static_cast<std::ptrdiff_t>(row + 16), 0u),
-              256u);
-  }
+}
+
+TEST(PageCodecModels, BitsWithoutAModelComeFromTheEnd) {
+  Encoder encoder;
+  encoder.bits(3, 5);
+  encoder.bits(32, 0x80000001u);
+  encoder.bits(1, 1);
+  const std::vector<std::byte> stored = encoder.finish();
+  ASSERT_EQ(stored.size(), std::size_t{8 + 5});
+  EXPECT_EQ(stored.back(), std::byte{0xb0});  // 101 1 0000 ...
+  EXPECT_EQ(stored[8], std::byte{0x30});      // ... 0011 and four that are left
+  const PaddedBytes padded(stored);
+  Decoder decoder(padded);
+  EXPECT_EQ(decoder.bits(3, 0), 5u);
+  EXPECT_FALSE(decoder.sound());
+  EXPECT_EQ(decoder.bits(32, 0), 0x80000001u);
+  EXPECT_EQ(decoder.bits(1, 0), 1u);
+  EXPECT_TRUE(decoder.sound());
 }
 
 }  // namespace

@@ -3,8 +3,6 @@
 namespace billow::format::page_coder {
 namespace {
 
-constexpr std::uint32_t kValueBits = 11;
-
 std::uint32_t byteAt(const std::byte* bytes, std::size_t at) {
   return std::to_integer<std::uint32_t>(bytes[at]);
 }
@@ -12,19 +10,6 @@ std::uint32_t byteAt(const std::byte* bytes, std::size_t at) {
 // The first local cell of a row of voxels; the others follow, two voxels each.
 constexpr std::uint32_t cellOfRow(std::uint32_t row) {
   return (row >> 5) << 3 | (row >> 2 & 1) << 2;
-}
-
-// Which voxels have an index other than 0.
-ActiveRows rowsInUse(const std::byte* indices, std::uint32_t bits) {
-  ActiveRows rows{};
-  for (std::uint32_t row = 0; row < rows.size(); ++row) {
-    std::uint64_t packed = 0;
-    std::memcpy(&packed, indices + row * bits, bits);
-    for (std::uint32_t z = 0; z < 8; ++z) {
-      rows[row] = static_cast<std::uint8_t>(rows[row] | ((packed >> (z * bits) & ((1u << bits) - 1)) != 0) << z);
-    }
-  }
-  return rows;
 }
 
 std::array<bool, kLocalCells> cellsInUse(const ActiveRows& rows) {
@@ -36,14 +21,18 @@ std::array<bool, kLocalCells> cellsInUse(const ActiveRows& rows) {
 }
 
 // Whether inactive voxels have index 0 and cells without active voxels the ends 0: then they need no bits.
-bool isRegular(const BrickShape& shape, const std::byte* payload, std::uint32_t bits) {
-  const bool local = isLocal(shape.encoding);
-  const ActiveRows used = rowsInUse(payload + (local ? kLocalCellBytes : 0), bits);
-  const ActiveRows& active = shape.hasMask ? shape.rows : used;
+bool isRegular(std::uint32_t encoding, const ActiveRows& active, const std::byte* payload) {
+  const std::uint32_t bits = indexBits(encoding);
+  const std::byte* indices = payload + endBytes(encoding);
   for (std::uint32_t row = 0; row < active.size(); ++row) {
-    if ((used[row] & ~active[row]) != 0) return false;
+    if (active[row] == 0xff) continue;
+    std::uint64_t packed = 0;
+    std::memcpy(&packed, indices + row * bits, bits);
+    for (std::uint32_t z = 0; z < 8; ++z) {
+      if ((active[row] >> z & 1) == 0 && (packed >> (z * bits) & ((1u << bits) - 1)) != 0) return false;
+    }
   }
-  if (!local) return true;
+  if (!isLocal(encoding)) return true;
   const auto cells = cellsInUse(active);
   for (std::uint32_t cell = 0; cell < kLocalCells; ++cell) {
     if (!cells[cell] && (byteAt(payload, 2 * cell) | byteAt(payload, 2 * cell + 1)) != 0) return false;
@@ -58,67 +47,24 @@ BrickModel::BrickModel() {
   ends_.fill(evenModel());
   coarse_.fill(evenModel());
   wide_.fill(evenModel());
-  for (std::uint32_t bits = 1; bits <= 8; ++bits) {
-    Cell& cell = uniformCells_[bits];
-    cell.origin = 0;
-    cell.slope = 1 << (16 - (8 - bits));
-    for (std::uint32_t i = 0; i < 1u << bits; ++i) cell.values[i] = static_cast<std::int16_t>(i << (kValueBits - bits));
-  }
 }
 
 template <class Coder>
-void BrickModel::code(Coder& coder, BrickShape& shape, std::byte* payload, MaskModel& masks) {
-  const std::uint32_t bits = indexBits(shape.encoding);
-  if (bits == 0) {
-    if (shape.encoding == kEncodingCoarse) return codeCoarse(coder, payload);
+bool BrickModel::code(Coder& coder, std::uint32_t encoding, const ActiveRows* mask, std::byte* payload) {
+  if (encoding == kEncodingCoarse) {
+    codeCoarse(coder, payload);
+  } else if (isBc7(encoding)) {
     for (int block = 0; block < 8; ++block) bc7_.code(coder, payload + 16 * block);
-    return;
-  }
-  if (bits == 16) return codeWide(coder, payload);
-  const bool regular = Coder::kDecodes || isRegular(shape, payload, bits);
-  if (coder.bit(regular_[shape.encoding], regular)) return codeIndexed(coder, shape, payload, masks);
-  codePlain(coder, payload, *brickBytes(shape.encoding));
-  shape.rows.fill(0xff);
-}
-
-template <class Coder>
-void BrickModel::codeIndexed(Coder& coder, BrickShape& shape, std::byte* payload, MaskModel& masks) {
-  const std::uint32_t bits = indexBits(shape.encoding);
-  const bool local = isLocal(shape.encoding);
-  std::byte* indices = payload + (local ? kLocalCellBytes : 0);
-  if (!shape.hasMask) {
-    if (!Coder::kDecodes) shape.rows = rowsInUse(indices, bits);
-    masks.code(coder, 3, shape.rows.data());
-  }
-  if (local) {
-    codeEnds(coder, shape.rows, payload);
-    setLocalCells(bits, payload);
+  } else if (encoding == kEncodingUniform16) {
+    codeWide(coder, payload);
+  } else if (mask != nullptr &&
+             !coder.bit(regular_[encoding], Coder::kDecodes || isRegular(encoding, *mask, payload))) {
+    codePlain(coder, payload, *brickBytes(encoding));
   } else {
-    cellOf_.fill(&uniformCells_[bits]);
+    if (isLocal(encoding)) codeEnds(coder, mask != nullptr ? *mask : kAllRows, payload);
+    return true;
   }
-  if (!shape.hasMask && bits == 1) {  // the mask said all
-    if (Coder::kDecodes) std::memcpy(indices, shape.rows.data(), shape.rows.size());
-    return;
-  }
-  voxels_.code(coder, {bits, shape.hasMask ? 0u : 1u, shape.rows.data(), cellOf_.data()}, indices);
-}
-
-void BrickModel::setLocalCells(std::uint32_t bits, const std::byte* ends) {
-  const std::int32_t most = (1 << bits) - 1;
-  const std::int32_t step = (8 << 16) / most;
-  for (std::uint32_t number = 0; number < kLocalCells; ++number) {
-    Cell& cell = localCells_[number];
-    const auto base = static_cast<std::int32_t>(byteAt(ends, 2 * number));
-    const std::int32_t span = static_cast<std::int32_t>(byteAt(ends, 2 * number + 1)) - base;
-    cell.origin = 8 * base;
-    cell.slope = span == 0 ? 0 : most * 65536 / span;
-    for (std::int32_t i = 0; i <= most; ++i) {
-      cell.values[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(8 * base + (span * i * step >> 16));
-    }
-  }
-  for (std::uint32_t row = 0; row < 64; ++row) {
-    for (std::uint32_t cell = 0; cell < 4; ++cell) cellOf_[4 * row + cell] = &localCells_[cellOfRow(row) | cell];
-  }
+  return false;
 }
 
 // A cell's ends by those of its neighbour that was coded last: along z, else y, else x.
@@ -185,8 +131,8 @@ void BrickModel::codePlain(Coder& coder, std::byte* bytes, std::size_t count) {
   }
 }
 
-template void BrickModel::code(Encoder&, BrickShape&, std::byte*, MaskModel&);
-template void BrickModel::code(Decoder&, BrickShape&, std::byte*, MaskModel&);
+template bool BrickModel::code(Encoder&, std::uint32_t, const ActiveRows*, std::byte*);
+template bool BrickModel::code(Decoder&, std::uint32_t, const ActiveRows*, std::byte*);
 template void BrickModel::codePlain(Encoder&, std::byte*, std::size_t);
 template void BrickModel::codePlain(Decoder&, std::byte*, std::size_t);
 

@@ -4,27 +4,30 @@
 
 #include "bc7_model.h"
 #include "billow/format/brick.h"
-#include "mask_model.h"
-#include "voxel_model.h"
 
 namespace billow::format::page_coder {
 
 using ActiveRows = std::array<std::uint8_t, 64>;  // row x * 8 + y: bit z
 
-// What the page tells of a brick's active voxels: `rows` where it has the mask, else those whose index is not 0 are.
-struct BrickShape {
-  std::uint32_t encoding;
-  bool hasMask;
-  ActiveRows rows;
-};
+inline constexpr ActiveRows kAllRows = [] {
+  ActiveRows rows{};
+  rows.fill(0xff);
+  return rows;
+}();
+
+// Bytes of a brick before its indices.
+constexpr std::uint32_t endBytes(std::uint32_t encoding) {
+  return isLocal(encoding) ? kLocalCellBytes : 0;
+}
 
 class BrickModel {
  public:
   BrickModel();
 
-  // Codes `payload` of brickBytes(encoding) bytes, and sets shape.rows to the voxels whose indices were coded.
+  // Codes `payload` of brickBytes(encoding) bytes; `mask` says which voxels are active where the page does, else it is
+  // nullptr. True where the indices, of 1 to 8 bits, are still to be coded: those of inactive voxels are 0.
   template <class Coder>
-  void code(Coder& coder, BrickShape& shape, std::byte* payload, MaskModel& masks);
+  bool code(Coder& coder, std::uint32_t encoding, const ActiveRows* mask, std::byte* payload);
 
   // Bytes that nothing is known of.
   template <class Coder>
@@ -32,16 +35,12 @@ class BrickModel {
 
  private:
   template <class Coder>
-  void codeIndexed(Coder& coder, BrickShape& shape, std::byte* payload, MaskModel& masks);
-  template <class Coder>
   void codeEnds(Coder& coder, const ActiveRows& rows, std::byte* ends);
   template <class Coder>
   void codeCoarse(Coder& coder, std::byte* bytes);
   template <class Coder>
   void codeWide(Coder& coder, std::byte* bytes);
-  void setLocalCells(std::uint32_t bits, const std::byte* ends);
 
-  VoxelModel voxels_;
   Bc7Model bc7_;
   std::array<BitModel, kEncodingCount> regular_;
   std::array<SymbolModel, 8> ends_;
@@ -51,9 +50,6 @@ class BrickModel {
   std::array<SymbolModel, 2> wide_;
   ClassBits wideBits_;
   std::array<ByteModel, 2> plain_;
-  std::array<Cell, 9> uniformCells_;  // by bits
-  std::array<Cell, kLocalCells> localCells_;
-  std::array<const Cell*, 256> cellOf_;
 };
 
 }  // namespace billow::format::page_coder

@@ -44,16 +44,6 @@ constexpr SymbolModel evenModel() {
   }
   return model;
 }
-// From sizes in 256ths.
-constexpr SymbolModel modelOf(const std::uint16_t (&sizes)[kSymbols]) {
-  SymbolModel model{};
-  std::uint32_t sum = 0;
-  for (std::uint32_t i = 0; i < kSymbols; ++i) {
-    model.below[i] = static_cast<std::int16_t>(sum * (kScale / 256));
-    sum += sizes[i];
-  }
-  return model;
-}
 constexpr BitModel bitModel(std::uint32_t one) {
   return {static_cast<std::uint16_t>(one), 0};
 }
@@ -125,15 +115,12 @@ class Encoder {
     adapt(model, value);
     return value;
   }
-  // `count` bits without a model, at most 32; 14 at a time, the low ones first.
+  // `count` bits without a model, at most 32.
   std::uint32_t bits(std::uint32_t count, std::uint32_t value) {
-    for (std::uint32_t done = 0; done < count;) {
-      const std::uint32_t step = count - done < 14 ? count - done : 14;
-      rans_.put((value >> done & ((1u << step) - 1)) << (kScaleLog2 - step), kScale >> step);
-      done += step;
-    }
+    rans_.putBits(count, value);
     return value;
   }
+  RansEncoder& rans() { return rans_; }
   std::vector<std::byte> finish() { return rans_.finish(); }
 
  private:
@@ -144,7 +131,7 @@ class Decoder {
  public:
   static constexpr bool kDecodes = true;
 
-  explicit Decoder(std::span<const std::byte> bytes) : rans_(bytes) {}
+  explicit Decoder(const PaddedBytes& bytes) : rans_(bytes) {}
 
   std::uint32_t symbol(SymbolModel& model, std::uint32_t) {
     const std::uint32_t value = find(model, rans_.peek());
@@ -158,17 +145,8 @@ class Decoder {
     adapt(model, value);
     return value;
   }
-  std::uint32_t bits(std::uint32_t count, std::uint32_t) {
-    std::uint32_t value = 0;
-    for (std::uint32_t done = 0; done < count;) {
-      const std::uint32_t step = count - done < 14 ? count - done : 14;
-      const std::uint32_t part = rans_.peek() >> (kScaleLog2 - step);
-      rans_.take(part << (kScaleLog2 - step), kScale >> step);
-      value |= part << done;
-      done += step;
-    }
-    return value;
-  }
+  std::uint32_t bits(std::uint32_t count, std::uint32_t) { return rans_.bits(count); }
+  RansDecoder& rans() { return rans_; }
   bool sound() const { return rans_.sound(); }
 
  private:

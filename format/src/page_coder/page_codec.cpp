@@ -29,7 +29,8 @@ std::vector<std::byte> encodePage(std::span<const StreamRange, kStreamCount> run
 bool decodePage(std::span<const StreamRange, kStreamCount> runs, std::span<const std::byte> stored,
                 std::span<std::byte> page) {
   if (page_coder::bytesOfRuns(runs) != page.size()) return false;
-  page_coder::Decoder coder(stored);
+  const page_coder::PaddedBytes padded(stored);
+  page_coder::Decoder coder(padded);
   freshModel(runs, page.data()).code(coder);
   return coder.sound();
 }

@@ -1,7 +1,9 @@
 #include "page_model.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace billow::format::page_coder {
 namespace {
@@ -27,6 +29,44 @@ std::uint32_t zigzag(std::uint32_t difference) {
 }
 std::uint32_t unzigzag(std::uint32_t value) {
   return value >> 1 ^ (0u - (value & 1));
+}
+
+constexpr bool hasSmallIndices(std::uint32_t encoding) {
+  return indexBits(encoding) >= 1 && indexBits(encoding) <= 8;
+}
+
+// Which voxels have an index other than 0.
+ActiveRows rowsInUse(const std::byte* indices, std::uint32_t bits) {
+  ActiveRows rows{};
+  for (std::uint32_t row = 0; row < rows.size(); ++row) {
+    std::uint64_t packed = 0;
+    std::memcpy(&packed, indices + row * bits, bits);
+    for (std::uint32_t z = 0; z < 8; ++z) {
+      rows[row] = static_cast<std::uint8_t>(rows[row] | ((packed >> (z * bits) & ((1u << bits) - 1)) != 0) << z);
+    }
+  }
+  return rows;
+}
+
+std::uint32_t countOf(const ActiveRows& rows) {
+  const auto words = std::bit_cast<std::array<std::uint64_t, 8>>(rows);
+  std::uint32_t count = 0;
+  for (const std::uint64_t word : words) count += static_cast<std::uint32_t>(std::popcount(word));
+  return count;
+}
+
+// At most 512 * 65535.
+std::uint32_t sumOf(const Texels& texels) {
+  return std::accumulate(texels.begin(), texels.end(), 0u);
+}
+std::uint32_t sumOf(Texels& texels, const ActiveRows& rows) {
+  for (std::uint32_t row = 0; row < rows.size(); ++row) {
+    if (rows[row] == 0xff) continue;
+    for (std::uint32_t z = 0; z < 8; ++z) {
+      if ((rows[row] >> z & 1) == 0) texels[row << 3 | z] = 0;
+    }
+  }
+  return sumOf(texels);
 }
 
 template <class Coder>
@@ -79,6 +119,7 @@ void PageModel::code(Coder& coder) {
   codeNodes<Coder, Node4>(coder, Stream::node4, kNode4Log2, node4Masks_);
   claimBricks();
   codeBricks(coder);
+  sumTexels();
   codeMeans(coder);
   codeChildren(coder);
 }
@@ -148,16 +189,16 @@ void PageModel::claimBricks() {
   }
 }
 
-ActiveRows PageModel::rowsOfMask(std::uint32_t number) {
-  return load<ActiveRows>(Stream::mask, number - run(Stream::mask).first);
+const ActiveRows* PageModel::maskOf(const Node3& node) {
+  if (node.mask == kMaskAll) return &kAllRows;
+  const StreamRange masks = run(Stream::mask);
+  if (node.mask - masks.first >= masks.count) return nullptr;
+  return reinterpret_cast<const ActiveRows*>(item(Stream::mask, node.mask - masks.first));
 }
 
 template <class Coder>
 void PageModel::codeBricks(Coder& coder) {
-  const std::uint32_t nodes = run(Stream::node3).count;
-  texelSums_.assign(nodes, 0);
-  activeCounts_.assign(nodes, 0);
-  const auto inPage = [&](std::uint32_t mask) { return mask - run(Stream::mask).first < run(Stream::mask).count; };
+  std::vector<VoxelBrick> voxels;
   for (std::uint32_t unit = 0; unit < run(Stream::unit).count;) {
     const Claim claim = claims_[unit];
     std::byte* payload = item(Stream::unit, unit);
@@ -166,30 +207,49 @@ void PageModel::codeBricks(Coder& coder) {
       ++unit;
       continue;
     }
-    const auto node = load<Node3>(Stream::node3, claim.node);
-    BrickShape shape{claim.encoding, node.mask == kMaskAll || inPage(node.mask), {}};
-    shape.rows.fill(0xff);
-    if (node.mask != kMaskAll && shape.hasMask) shape.rows = rowsOfMask(node.mask);
-    bricks_.code(coder, shape, payload, brickMasks_);
-    Texels texels;
-    decodeTexels(claim.encoding, {payload, *brickBytes(claim.encoding)}, texels);
-    for (std::uint32_t i = 0; i < kBrickVoxels; ++i) {
-      if ((shape.rows[i >> 3] >> (i & 7) & 1) != 0) texelSums_[claim.node] += texels[i];
-    }
-    for (const std::uint8_t row : shape.rows) {
-      activeCounts_[claim.node] += static_cast<std::uint32_t>(std::popcount(row));
+    const ActiveRows* mask = maskOf(load<Node3>(Stream::node3, claim.node));
+    if (bricks_.code(coder, claim.encoding, mask, payload)) {
+      const std::uint8_t* rows = mask != nullptr ? mask->data() : nullptr;
+      voxels.push_back({payload + endBytes(claim.encoding), rows, indexBits(claim.encoding)});
     }
     unit += brickUnits(claim.encoding);
+  }
+  voxels_.code(coder, voxels);
+}
+
+// Of constants and bricks of the page: how many voxels are active, and the sum of their texels.
+void PageModel::sumTexels() {
+  const std::uint32_t nodes = run(Stream::node3).count;
+  texelSums_.assign(nodes, 0);
+  activeCounts_.assign(nodes, 0);
+  for (std::uint32_t unit = 0; unit < claims_.size(); ++unit) {
+    const Claim claim = claims_[unit];
+    if (claim.node == kNoClaim) continue;
+    const ActiveRows* mask = maskOf(load<Node3>(Stream::node3, claim.node));
+    const std::span payload(item(Stream::unit, unit), *brickBytes(claim.encoding));
+    Texels texels;
+    decodeTexels(claim.encoding, payload, texels);
+    std::uint32_t& count = activeCounts_[claim.node];
+    if (mask != nullptr) {
+      count = countOf(*mask);
+      texelSums_[claim.node] = sumOf(texels, *mask);
+    } else if (!hasSmallIndices(claim.encoding)) {
+      count = kBrickVoxels;
+      texelSums_[claim.node] = sumOf(texels);
+    } else if (isLocal(claim.encoding)) {
+      const ActiveRows rows = rowsInUse(payload.data() + kLocalCellBytes, indexBits(claim.encoding));
+      count = countOf(rows);
+      texelSums_[claim.node] = sumOf(texels, rows);
+    } else {
+      count = static_cast<std::uint32_t>(kBrickVoxels - std::count(texels.begin(), texels.end(), 0));
+      texelSums_[claim.node] = sumOf(texels);
+    }
   }
   for (std::uint32_t i = 0; i < nodes; ++i) {
     const auto node = load<Node3>(Stream::node3, i);
     if (encodingOf(node) != kEncodingConstant) continue;
-    activeCounts_[i] = kBrickVoxels;
-    if (!inPage(node.mask)) continue;
-    activeCounts_[i] = 0;
-    for (const std::uint8_t row : rowsOfMask(node.mask)) {
-      activeCounts_[i] += static_cast<std::uint32_t>(std::popcount(row));
-    }
+    const ActiveRows* mask = maskOf(node);
+    activeCounts_[i] = mask != nullptr ? countOf(*mask) : kBrickVoxels;
   }
 }
 

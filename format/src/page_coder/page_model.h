@@ -6,6 +6,8 @@
 #include <span>
 
 #include "brick_model.h"
+#include "mask_model.h"
+#include "voxel_model.h"
 
 namespace billow::format::page_coder {
 
@@ -40,6 +42,7 @@ class PageModel {
   void claimBricks();
   template <class Coder>
   void codeBricks(Coder& coder);
+  void sumTexels();
   template <class Coder>
   void codeMeans(Coder& coder);
   template <class Coder, class Node>
@@ -53,7 +56,8 @@ class PageModel {
   Item load(Stream stream, std::uint32_t number);
   template <class Item>
   void store(Stream stream, std::uint32_t number, const Item& value);
-  ActiveRows rowsOfMask(std::uint32_t number);
+  // The mask of a node where the page has it, else nullptr.
+  const ActiveRows* maskOf(const Node3& node);
 
   PageRuns runs_;
   std::array<std::byte*, kStreamCount> at_;
@@ -75,6 +79,7 @@ class PageModel {
   BitModel meanRest_ = bitModel(64);
   MaskModel brickMasks_, node4Masks_, node5Masks_;
   BrickModel bricks_;
+  VoxelModel voxels_;
   std::array<FloatModel, 4> values_;
   std::array<BitModel, 2> tileSame_;
   NumberModel flags_;

@@ -1,4 +1,4 @@
-// The codec `model` of pages: adaptive models of what a page holds over an entropy coder. spec/pagecodec.md.
+// The codec `model` of pages: models of what a page holds over an entropy coder. spec/pagecodec.md.
 #ifndef BILLOW_FORMAT_PAGE_CODEC_H
 #define BILLOW_FORMAT_PAGE_CODEC_H
 
