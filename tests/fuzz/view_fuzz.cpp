@@ -3,6 +3,7 @@
 #include <cstdlib>
 
 #include "billow/format/grid_view.h"
+#include "billow/format/particle_field.h"
 #include "billow/format/validate.h"
 #include "pack_image.h"
 
@@ -28,6 +29,18 @@ void walk(const GridView& view) {
   if (sum != sum) std::abort();  // all values are finite, and the sum of so few is too
 }
 
+void walk(const EffectTables& tables) {
+  const ParticleField field(tables);
+  for (std::uint32_t e = 0; e < tables.effects.size(); ++e) {
+    const auto particles = particlesAt(tables, e, 0.5);
+    if (particles.size() > kMaxAlive) std::abort();
+    if (particles.empty()) continue;
+    const auto& center = particles.front().center;
+    const float density = field.sample(particles.front(), {center[0], center[1], center[2]}).density;
+    if (!(density >= 0 && density <= 1)) std::abort();
+  }
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -42,6 +55,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const Result<Pack> pack = Pack::open(makeMemorySource(bytes));
   if (sound && !pack) std::abort();
   if (!pack) return 0;
+  walk(pack->effects());
   for (const GridFrame& frame : pack->gridFrames()) {
     const Result<GridView> view = GridView::load(*pack, frame);
     if (view) walk(*view);
