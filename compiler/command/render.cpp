@@ -128,8 +128,8 @@ Checked<void> renderAll(const Job& job) {
   if (!gpu) return tl::unexpected(toRefusal(gpu.error(), job.request.pack));
   const auto renderer = runtime::Renderer::create((*gpu)->host(), {.gpuBudget = job.request.gpuBudget});
   if (!renderer) return tl::unexpected(toRefusal(renderer.error(), job.request.pack));
-  // No prepare(): it builds the pipelines of every frame ahead, so that none is late. Here nobody waits for a frame, and
-  // those that the chosen frames need are built when they are met.
+  // No prepare(): it builds the pipelines of every frame ahead, so that none is late. Here nobody waits for a frame,
+  // and those that the chosen frames need are built when they are met.
   const bool progress = job.frames.size() > 1 && isatty(STDERR_FILENO) != 0;
   for (std::size_t i = 0; i < job.frames.size(); ++i) {
     if (auto done = renderFrame(job, **gpu, **renderer, draw, job.frames[i]); !done) return done;
