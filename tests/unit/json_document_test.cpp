@@ -4,6 +4,7 @@
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <random>
 
 #include "billow/format/look.h"
 #include "billow/format/source.h"
@@ -54,6 +55,28 @@ TEST(JsonDocument, RefusesEndlessDepth) {
   EXPECT_NE(complaint(nested(kMostLevels + 1)).find("expected at most 64 levels"), std::string::npos);
   EXPECT_NE(complaint(nested(1000000)).find("lies too deep"), std::string::npos);
   EXPECT_NE(complaint(std::string(1000000, '[')).find("lies too deep"), std::string::npos);
+}
+
+// Whatever the bytes, a value or one line.
+TEST(JsonDocument, TakesAnyBytes) {
+  const std::string whole =
+      R"({"a": [1, -2.5e3, true, null], /* c */ "b\u00e4": {"k": "text", "l": {}}, "look": [[]]})";
+  std::mt19937 random(1);
+  int reached = 0;
+  for (int round = 0; round < 3000; ++round) {
+    std::string text = whole.substr(0, random() % 4 == 0 ? random() % whole.size() : whole.size());
+    for (std::uint32_t i = 0; i < random() % 3 && !text.empty(); ++i) {
+      text[random() % text.size()] = static_cast<char>(random());
+    }
+    const std::string told = complaint(text, [](const Value& root) {
+      root.requireKeys({"a", "b", "look"});
+      for (const Value& item : root.at("a").items("a list")) (void)item.single({-1e9, 1e9});
+    });
+    EXPECT_EQ(told.find('\n'), std::string::npos) << told;
+    EXPECT_TRUE(told.empty() || told.starts_with("e.json: ")) << told;
+    reached += told.find("b\\u00e4") != std::string::npos ? 1 : 0;
+  }
+  EXPECT_GT(reached, 100) << "most texts must get as far as their keys";
 }
 
 TEST(JsonDocument, ReadsFiles) {
