@@ -28,11 +28,11 @@ std::vector<double> evenTicks(double low, double high, std::size_t most) {
 
 std::vector<double> octaveTicks(double low, double high) {
   std::vector<double> ticks;
-  for (const double parts : {1.0, 2.0, 4.0}) {
+  for (const int parts : {1, 2, 4}) {
     ticks.clear();
-    for (double octave = std::exp2(std::floor(std::log2(low))); octave <= high; octave *= 2) {
-      for (double part = 0; part < parts; ++part) {
-        const double tick = octave * (1 + part / parts);
+    for (int octave = std::ilogb(low); std::ldexp(1.0, octave) <= high; ++octave) {
+      for (int part = 0; part < parts; ++part) {
+        const double tick = std::ldexp(1 + 1.0 * part / parts, octave);
         if (tick >= low && tick <= high) ticks.push_back(tick);
       }
     }

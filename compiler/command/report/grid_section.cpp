@@ -30,6 +30,7 @@ std::string costRow(const RateCurve& curve, double packBits) {
 // Cheapest first, then those out of reach.
 std::vector<const RateCurve*> byCost(const std::vector<RateCurve>& curves) {
   std::vector<const RateCurve*> order;
+  order.reserve(curves.size());
   for (const RateCurve& curve : curves) order.push_back(&curve);
   std::stable_sort(order.begin(), order.end(),
                    [](const RateCurve* a, const RateCurve* b) { return a->bits && (!b->bits || *a->bits < *b->bits); });

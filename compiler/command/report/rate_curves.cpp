@@ -117,7 +117,9 @@ class Curves {
     addPoint(curve, *cheapest, squaredError);
     if (curve.points.empty()) return curve;
     const double last = std::min(frame_.row.psnr() + kHeadroom, kHighest);
-    for (double psnr = std::ceil(curve.points[0].psnr / kStep) * kStep; psnr <= last; psnr += kStep) {
+    const auto firstStep = static_cast<int>(std::ceil(curve.points[0].psnr / kStep));
+    for (int step = firstStep; step * kStep <= last; ++step) {
+      const double psnr = step * kStep;
       const double rmse = frame_.row.range / std::pow(10.0, psnr / 20);
       const auto bytes = bytesAt(choices, rmse * rmse * voxels(), squaredError);
       if (!bytes) break;

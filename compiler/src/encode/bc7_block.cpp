@@ -16,7 +16,7 @@ class BitWriter {
     const std::uint64_t bits = value & (0xffffffffu >> (32 - count));
     const std::uint32_t shift = position_ & 63;
     words_[position_ >> 6] |= bits << shift;
-    if (shift + count > 64) words_[1] |= bits >> (64 - shift);
+    if (shift + count > 64) words_[1] |= bits >> 1 >> (63 - shift);
     position_ += count;
   }
   void store(std::byte* block) const {

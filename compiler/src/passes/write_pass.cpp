@@ -145,7 +145,7 @@ format::GridFrame WritePass::addNew(const FrameWork& frame, std::size_t g) {
     tally.squaredError += brick.squaredError;
     tally.activeVoxels += work.trials->activeVoxels(i);
   }
-  before_[g].keep(imported, std::move(chosen));
+  before_[g].keep(imported, chosen);
   return record;
 }
 
