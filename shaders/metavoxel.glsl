@@ -64,6 +64,13 @@ uint texelNumber(uint slot, uvec3 texel) {
   return ((slot * edgeTexels() + texel.z) * edgeTexels() + texel.y) * edgeTexels() + texel.x;
 }
 
+uint blocksAxis() { return (edgeTexels() + kSubBlock - 1u) / kSubBlock; }
+uint blockNumber(uint slot, uvec3 block) {
+  const uint n = blocksAxis();
+  return ((slot * n + block.z) * n + block.y) * n + block.x;
+}
+uint blockHolds(uint slot, uvec3 block) { return Words(meta.rounds.zw).items[blockNumber(slot, block)]; }
+
 uint positionOf(uvec3 cell) { return Words(meta.cells.zw).items[cellNumber(cell)] - 1u; }  // kNone where nothing is
 uint cellAt(uint position) { return Words(meta.items.zw).items[position]; }
 uint wordOf(uint cell) { return Words(meta.cells.xy).items[cell]; }

@@ -8,18 +8,23 @@ struct Column {
   uint slot;
   uint position;
   uvec3 cell;
+  uvec2 block;  // of texels, the workgroup's
   uvec2 texel;
 };
 
 Column columnOf() {
-  const uint blocks = (edgeTexels() + kSubBlock - 1u) / kSubBlock;
+  const uint blocks = blocksAxis();
   Column column;
   column.slot = gl_WorkGroupID.y;
   column.position = Rounds(meta.rounds.xy).items[pass.round].range.x + column.slot;
   column.cell = cellOf(cellAt(column.position));
-  column.texel = uvec2(gl_WorkGroupID.x % blocks, gl_WorkGroupID.x / blocks) * kSubBlock + gl_LocalInvocationID.xy;
+  column.block = uvec2(gl_WorkGroupID.x % blocks, gl_WorkGroupID.x / blocks);
+  column.texel = column.block * kSubBlock + gl_LocalInvocationID.xy;
   return column;
 }
+
+// The texels of block z of a column, from the first to past the last.
+uvec2 texelsOf(uint z) { return uvec2(z * kSubBlock, min((z + 1u) * kSubBlock, edgeTexels())); }
 
 bool insideColumn(uvec2 texel) {
   return all(greaterThanEqual(texel, uvec2(1u))) && all(lessThanEqual(texel, uvec2(innerVoxels())));

@@ -1,4 +1,4 @@
-// One volume into the metavoxels of a round: a workgroup a block of 8^3 texels, two texels a thread.
+// One volume into the metavoxels of a round.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_buffer_reference : require
@@ -7,8 +7,6 @@
 
 #include "medium.glsl"
 #include "metavoxel_block.glsl"
-
-layout(local_size_x = 8, local_size_y = 8, local_size_z = 4) in;
 
 const int kMostSamples = 4;  // an axis
 
@@ -49,7 +47,7 @@ Texel sampleVolume(vec3 voxel) {
     }
   }
   const float share = meta.eye.w / float(count.x * count.y * count.z);
-  return Texel(params.albedo.rgb, extinction * share, emission * share);
+  return Texel(extinction > 0.0 ? params.albedo.rgb : vec3(0.0), extinction * share, emission * share);
 }
 
 void main() {
@@ -57,15 +55,7 @@ void main() {
   const uint volumes = wordOf(block.number) >> kVolumeBit;
   if ((volumes >> pass.volume & 1u) == 0u) return;
   const bool first = (volumes & ((1u << pass.volume) - 1u)) == 0u;
-  for (uint i = 0u; i < 2u; ++i) {
-    const uvec3 texel = block.texel + uvec3(gl_LocalInvocationID.xy, gl_LocalInvocationID.z + 4u * i);
-    if (any(greaterThanEqual(texel, uvec3(edgeTexels())))) continue;
-    Texel sum = sampleVolume(texelVoxel(block.cell, texel));
-    if (!(sum.extinction > 0.0)) sum.albedo = vec3(0.0);
-    if (!first) {
-      const Texel old = loadTexel(block.slot, texel);
-      sum = Texel(max(old.albedo, sum.albedo), old.extinction + sum.extinction, old.emission + sum.emission);
-    }
-    storeTexel(block.slot, texel, sum);
-  }
+  Texel values[2];
+  for (uint i = 0u; i < 2u; ++i) values[i] = sampleVolume(texelVoxel(block.cell, texelOf(block, i)));
+  storeBlock(block, values, first);
 }

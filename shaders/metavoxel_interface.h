@@ -13,9 +13,12 @@
 namespace billow::runtime::gpu {
 #endif
 
-BILLOW_GPU_CONST kPlanes = 5u;      // of the frustum: near, left, right, lower, upper
-BILLOW_GPU_CONST kSubBlock = 8u;    // texels an edge of what one workgroup of fill writes
-BILLOW_GPU_CONST kVolumeBit = 24u;  // of a cell's word: below it particles are counted, from it on volumes flagged
+BILLOW_GPU_CONST kPlanes = 5u;         // of the frustum: near, left, right, lower, upper
+BILLOW_GPU_CONST kSubBlock = 8u;       // texels an edge of what one workgroup of fill writes
+BILLOW_GPU_CONST kBlockMatter = 1u;    // of a block of texels: some have extinction or emission
+BILLOW_GPU_CONST kBlockEmission = 2u;  // some have emission; else none of the block's is written
+BILLOW_GPU_CONST kBlockNear = 4u;      // matter within it or in a texel beside it
+BILLOW_GPU_CONST kVolumeBit = 24u;     // of a cell's word: below it particles are counted, from it on volumes flagged
 BILLOW_GPU_CONST kMaxVolumes = 8u;
 BILLOW_GPU_CONST kCubeLayers = 6u;       // of a cube map: faces, each with a border of one texel
 BILLOW_GPU_CONST kCubeFaceTexels = 66u;  // an edge, border included
@@ -59,7 +62,7 @@ struct MetavoxelParams {
   uvec4 texels;   // addresses: emission of each texel of the pool (RGB9E5); optical depth of columns by position
   uvec4 tables;   // addresses: materials; curves
   uvec4 ramps;    // addresses: ramps; counters
-  uvec4 rounds;   // address of the rounds, 0, 0
+  uvec4 rounds;   // addresses: rounds; what the pool's blocks of texels hold
 };
 BILLOW_GPU_SIZE(MetavoxelParams, 25 * 16);
 

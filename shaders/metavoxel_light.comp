@@ -17,24 +17,31 @@ vec3 sunAt(float depth, vec3 voxel) {
                                     scatteredShare(arrives.b, cosine));
 }
 
+// Lights one texel; `depth` is that of the light that reaches it, and then that of what leaves it.
+void lightTexel(Column column, uint z, uint holds, inout float depth) {
+  const uvec3 texel = uvec3(column.texel, z);
+  const Texel matter = loadTexel(column.slot, texel, holds);
+  const float through = lightDepth(matter.extinction);
+  // The first texel is the border, which the light has left behind.
+  if (z == 0u) depth -= through;
+  vec3 radiance = matter.emission;
+  if (matter.extinction > 0.0) {
+    const vec3 light = sunAt(max(depth + 0.5 * through, 0.0), texelVoxel(column.cell, texel)) + params.ambient.rgb;
+    radiance += matter.albedo * matter.extinction * light;
+  }
+  depth += through;
+  imageStore(pool, ivec3(slotCorner(column.slot) + texel),
+             vec4(clamp(radiance, vec3(-kLargestHalf), vec3(kLargestHalf)), matter.extinction));
+}
+
 void main() {
   const Column column = columnOf();
-  const uint edge = edgeTexels();
-  if (any(greaterThanEqual(column.texel, uvec2(edge)))) return;
+  if (any(greaterThanEqual(column.texel, uvec2(edgeTexels())))) return;
   float depth = depthAbove(column.cell, column.texel);
-  for (uint z = 0u; z < edge; ++z) {
-    const uvec3 texel = uvec3(column.texel, z);
-    const Texel matter = loadTexel(column.slot, texel);
-    const float through = lightDepth(matter.extinction);
-    // The first texel is the border, which the light has left behind.
-    if (z == 0u) depth -= through;
-    vec3 radiance = matter.emission;
-    if (matter.extinction > 0.0) {
-      const vec3 light = sunAt(max(depth + 0.5 * through, 0.0), texelVoxel(column.cell, texel)) + params.ambient.rgb;
-      radiance += matter.albedo * matter.extinction * light;
-    }
-    depth += through;
-    imageStore(pool, ivec3(slotCorner(column.slot) + texel),
-               vec4(clamp(radiance, vec3(-kLargestHalf), vec3(kLargestHalf)), matter.extinction));
+  for (uint block = 0u; block < blocksAxis(); ++block) {
+    const uint holds = blockHolds(column.slot, uvec3(column.block, block));
+    if ((holds & kBlockMatter) == 0u) continue;
+    const uvec2 range = texelsOf(block);
+    for (uint z = range.x; z < range.y; ++z) lightTexel(column, z, holds, depth);
   }
 }

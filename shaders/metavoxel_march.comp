@@ -77,14 +77,22 @@ Sum march(Ray ray, float end, float shift, float seen) {
     if (t >= span.y || length <= 0.0) break;
     const vec3 voxel = ray.origin + ray.direction * t;
     const vec3 cell = clamp(floor(voxel / inner), vec3(box.low), vec3(box.high - 1u));
+    const vec3 corner = cell * inner;
     const uint slot = positionOf(uvec3(cell)) - range.x;
+    vec3 low = corner;
+    vec3 high = corner + inner;
     if (slot < range.y) {
-      shade(readSlot(slot, clamp(voxel - cell * inner, 0.0, inner)), t / ray.perDepth, length, sum);
-      k += 1.0;
-    } else {
-      const float leave = crossBox(ray, cell * inner, (cell + 1.0) * inner).y;
-      k = max(k + 1.0, ceil(leave / dt - shift));
+      const vec3 inCell = clamp(voxel - corner, 0.0, inner);
+      const vec3 block = floor((inCell + 1.0) / float(kSubBlock));
+      if ((blockHolds(slot, uvec3(block)) & kBlockNear) != 0u) {
+        shade(readSlot(slot, inCell), t / ray.perDepth, length, sum);
+        k += 1.0;
+        continue;
+      }
+      low = max(low, corner - 1.0 + block * float(kSubBlock));
+      high = min(high, corner - 1.0 + (block + 1.0) * float(kSubBlock));
     }
+    k = max(k + 1.0, ceil(crossBox(ray, low, high).y / dt - shift));
   }
   return sum;
 }

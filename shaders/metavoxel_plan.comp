@@ -12,7 +12,7 @@ shared uint before;
 
 void planRounds(uint items) {
   Rounds rounds = Rounds(meta.rounds.xy);
-  const uint blocks = (edgeTexels() + kSubBlock - 1u) / kSubBlock;
+  const uint blocks = blocksAxis();
   uint next = 0u;
   for (uint i = 0u; i < meta.limits.w; ++i) {
     const bool front = next < before;

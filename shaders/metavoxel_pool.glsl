@@ -15,13 +15,13 @@ struct Texel {
   vec3 emission;
 };
 
-Texel loadTexel(uint slot, uvec3 texel) {
+// `holds` is of the texel's block.
+Texel loadTexel(uint slot, uvec3 texel, uint holds) {
+  if ((holds & kBlockMatter) == 0u) return Texel(vec3(0.0), 0.0, vec3(0.0));
   const vec4 color = imageLoad(pool, ivec3(slotCorner(slot) + texel));
-  return Texel(color.rgb, color.a, unpackRgb9e5(Words(meta.texels.xy).items[texelNumber(slot, texel)]));
-}
-void storeTexel(uint slot, uvec3 texel, Texel value) {
-  imageStore(pool, ivec3(slotCorner(slot) + texel), vec4(value.albedo, min(value.extinction, kLargestHalf)));
-  Words(meta.texels.xy).items[texelNumber(slot, texel)] = packRgb9e5(value.emission);
+  const bool emits = (holds & kBlockEmission) != 0u;
+  const vec3 emission = emits ? unpackRgb9e5(Words(meta.texels.xy).items[texelNumber(slot, texel)]) : vec3(0.0);
+  return Texel(color.rgb, color.a, emission);
 }
 
 // Optical depth of a voxel on the light's way. Additive for both laws of attenuation: what arrives is exp(-sum).

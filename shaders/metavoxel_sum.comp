@@ -13,6 +13,10 @@ void main() {
   if (!insideColumn(column.texel)) return;
   const ivec3 first = ivec3(slotCorner(column.slot) + uvec3(column.texel, 0u));
   float depth = 0.0;
-  for (int z = 1; z <= int(innerVoxels()); ++z) depth += lightDepth(imageLoad(pool, first + ivec3(0, 0, z)).a);
+  for (uint block = 0u; block < blocksAxis(); ++block) {
+    if ((blockHolds(column.slot, uvec3(column.block, block)) & kBlockMatter) == 0u) continue;
+    const uvec2 range = clamp(texelsOf(block), 1u, innerVoxels() + 1u);
+    for (uint z = range.x; z < range.y; ++z) depth += lightDepth(imageLoad(pool, first + ivec3(0, 0, z)).a);
+  }
   Floats(meta.texels.zw).items[columnNumber(column.position, column.texel - 1u)] = depth;
 }

@@ -75,12 +75,17 @@ struct Matter {  // per world unit
   vec3 emission;
 };
 
-// False where the particle has no density. `place` is relative to the centre of the space.
-bool matterAt(Particle particle, vec3 place, out Matter matter) {
+// False where particle `number` has no density. `place` is relative to the centre of the space.
+bool matterAt(uint number, vec3 place, out Matter matter) {
   matter = Matter(0.0, vec3(0.0), vec3(0.0));
+  Particles particles = Particles(meta.entries.zw);
+  const vec3 apart = place - vectorOf(particles.items[number].center);
+  const float radius = particles.items[number].radius;
+  if (dot(apart, apart) >= radius * radius) return false;
+  // The rest is read only where the bounding sphere is.
+  const Particle particle = particles.items[number];
   const vec4 turn = vec4(-particle.rotation[0], -particle.rotation[1], -particle.rotation[2], particle.rotation[3]);
-  const vec3 q = rotated(turn, place - vectorOf(particle.center));
-  if (dot(q, q) >= particle.radius * particle.radius) return false;
+  const vec3 q = rotated(turn, apart);
   const float s = shareOf(particle, q);
   if (!(s < 1.0)) return false;
   const float m = particle.map == kNoMap ? 1.0 : sampleCube(particle.map, q);

@@ -185,7 +185,7 @@ class MetavoxelsImpl final : public Metavoxels {
     params.texels = both(r.emission, r.columns);
     params.tables = both(r.materials, r.curves);
     params.ramps = both(r.ramps, r.counters);
-    params.rounds = both(r.rounds, r.rounds);
+    params.rounds = both(r.rounds, r.blocks);
     put(upload.space, params);
     pipelines_.write(resources_, next_, draw);
     return {};
@@ -276,6 +276,9 @@ class MetavoxelsImpl final : public Metavoxels {
     const std::uint64_t at = resources_.sizes().regions.rounds + round * sizeof(gpu::MetavoxelRound);
     const std::uint64_t fill = at + offsetof(gpu::MetavoxelRound, fill);
     const std::uint64_t columns = at + offsetof(gpu::MetavoxelRound, columns);
+    const MetavoxelSizes& sizes = resources_.sizes();
+    device_.api.vkCmdFillBuffer(commands, resources_.arrays.handle(), sizes.regions.blocks, sizes.blocks() * 4, 0);
+    barrier(commands);
     PassPush push{.round = round, .finish = rounds == 1 ? 1u : 0u};
     for (std::uint32_t i = 0; i < steps.volumes.size(); ++i) {
       if (!steps.volumes[i].drawn()) continue;

@@ -48,6 +48,7 @@ MetavoxelRegions regionsOf(const MetavoxelConfig& config, const MetavoxelSizes& 
   regions.curves = region(bytesOf(tables.curves));
   regions.ramps = region(bytesOf(tables.ramps));
   regions.columns = region(most * sizes.inner * sizes.inner * 4);
+  regions.blocks = region(sizes.blocks() * 4);
   regions.emission = region(std::uint64_t{sizes.slots()} * sizes.edge * sizes.edge * sizes.edge * 4);
   regions.bytes = end;
   return regions;

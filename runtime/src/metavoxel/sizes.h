@@ -14,7 +14,7 @@ inline constexpr std::uint64_t kTexelBytes = 12;  // 8 of the pool's image, 4 of
 // Where the arrays of metavoxel_interface.h begin in the device's buffer.
 struct MetavoxelRegions {
   std::uint64_t counters, rounds, words, positions, found, cellAt, lists, cursors, entries, particles, materials,
-      curves, ramps, columns, emission;
+      curves, ramps, columns, blocks, emission;
   std::uint64_t bytes;
 };
 
@@ -27,6 +27,10 @@ struct MetavoxelSizes {
   MetavoxelRegions regions;
 
   std::uint32_t slots() const { return slotsX * slotsY * slotsZ; }
+  std::uint64_t blocks() const {  // of all slots
+    const std::uint64_t along = (edge + gpu::kSubBlock - 1) / gpu::kSubBlock;
+    return slots() * along * along * along;
+  }
   std::uint64_t cells() const { return std::uint64_t{axis} * axis * axis; }
   std::uint32_t shadowEdge() const { return axis * inner; }
 };
