@@ -3,7 +3,6 @@
 #ifndef BILLOW_FORMAT_SRC_PAGE_CODER_VOXEL_MODEL_H
 #define BILLOW_FORMAT_SRC_PAGE_CODER_VOXEL_MODEL_H
 
-#include <memory>
 #include <span>
 
 #include "token_tables.h"
