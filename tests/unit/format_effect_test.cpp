@@ -29,11 +29,14 @@ TEST(ExactMath, AgreesWithTheLibrary) {
     const double turns = i * 0.003 - 6;
     EXPECT_NEAR(sineCosine(turns).sine, std::sin(turns * 2 * std::numbers::pi), 1e-13) << turns;
     EXPECT_NEAR(sineCosine(turns).cosine, std::cos(turns * 2 * std::numbers::pi), 1e-13) << turns;
+    const SineCosine angle = sineCosine(turns);
+    EXPECT_NEAR(std::remainder(turnsOf(3 * angle.sine, 3 * angle.cosine) - turns, 1), 0, 1e-14) << turns;
     EXPECT_NEAR(cubeRoot(i / 4000.0), std::cbrt(i / 4000.0), 1e-12);
   }
   EXPECT_EQ(decayMean(0), 1);
   EXPECT_EQ(decayMeanSlope(0), 0.5);
   EXPECT_EQ(decay(1e9), 0);
+  EXPECT_EQ(turnsOf(0, 0), 0);
   EXPECT_EQ(decayMean(1e9), 1e-9);
 }
 

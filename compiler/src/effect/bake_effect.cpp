@@ -46,6 +46,10 @@ class Baker {
     record.displacementRow = rows(emitter.displacement, 1, 1);
     record.firstMap = emitter.map ? maps(*emitter.map) : format::kNoMap;
     record.mapCount = emitter.map ? emitter.map->frames : 0;
+    if (emitter.picture) {
+      record.firstMap = shared(effects_.maps, std::vector{makePictureMap(*emitter.picture)});
+      record.mapCount = 1;
+    }
     record.material = material(emitter);
     effects_.emitters.push_back(record);
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "billow/format/effect.h"
+#include "effect/image.h"
 
 namespace billow::compiler {
 
@@ -48,6 +49,7 @@ struct EmitterDescription {
   Keys profile;
   std::vector<RampRow> diffuseRamp, emissionRamp;
   std::optional<NoiseMap> map;
+  std::optional<Image> picture;  // of the displacement, instead of noise: longitude and latitude
 };
 
 struct EffectDescription {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 
+#include "billow/format/exact_math.h"
 #include "billow/format/noise.h"
 #include "effect/bc4.h"
 #include "parallel.h"
@@ -165,18 +166,11 @@ format::CubeMap encode(std::vector<float> level) {
   return map;
 }
 
-}  // namespace
-
-std::vector<format::CubeMap> makeNoiseMaps(const NoiseMap& map) {
-  std::vector<double> values(kMapTexels * map.frames);
-  parallelRanges(values.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      values[i] = animated(map, unitDirection(i % kMapTexels), static_cast<std::uint32_t>(i / kMapTexels));
-    }
-  });
+// The values of all maps together are stretched to [0, 1].
+std::vector<format::CubeMap> encodeAll(const std::vector<double>& values) {
   const auto [least, most] = std::minmax_element(values.begin(), values.end());
   const double low = *least, span = *most > low ? *most - low : 1;
-  std::vector<format::CubeMap> maps(map.frames);
+  std::vector<format::CubeMap> maps(values.size() / kMapTexels);
   parallelRanges(maps.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t f = begin; f < end; ++f) {
       std::vector<float> level(kMapTexels);
@@ -187,6 +181,29 @@ std::vector<format::CubeMap> makeNoiseMaps(const NoiseMap& map) {
     }
   });
   return maps;
+}
+
+}  // namespace
+
+format::CubeMap makePictureMap(const Image& picture) {
+  std::vector<double> values(kMapTexels);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const Vec3 d = unitDirection(i);
+    const double across = std::sqrt(d[0] * d[0] + d[2] * d[2]);
+    const double longitude = format::turnsOf(d[0], d[2]), latitude = format::turnsOf(d[1], across);
+    values[i] = picture.sample(longitude + 0.5, 0.5 - 2 * latitude, true)[0];
+  }
+  return encodeAll(values).front();
+}
+
+std::vector<format::CubeMap> makeNoiseMaps(const NoiseMap& map) {
+  std::vector<double> values(kMapTexels * map.frames);
+  parallelRanges(values.size(), 1024, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      values[i] = animated(map, unitDirection(i % kMapTexels), static_cast<std::uint32_t>(i / kMapTexels));
+    }
+  });
+  return encodeAll(values);
 }
 
 }  // namespace billow::compiler

@@ -1,4 +1,4 @@
-// Displacement maps from noise.
+// Displacement maps.
 #ifndef BILLOW_COMPILER_EFFECT_NOISE_MAP_H
 #define BILLOW_COMPILER_EFFECT_NOISE_MAP_H
 
@@ -11,6 +11,10 @@ namespace billow::compiler {
 
 // `map.frames` maps, whose values together fill [0, 1]. The same bytes for any thread count.
 std::vector<format::CubeMap> makeNoiseMaps(const NoiseMap& map);
+
+// From a picture of all directions: longitude along its width, from -Z over -X, +Z and +X back to -Z, and +Y at the
+// top. The red values, stretched to [0, 1].
+format::CubeMap makePictureMap(const Image& picture);
 
 }  // namespace billow::compiler
 

@@ -2,6 +2,7 @@
 #ifndef BILLOW_COMPILER_EFFECT_READ_H
 #define BILLOW_COMPILER_EFFECT_READ_H
 
+#include <filesystem>
 #include <string>
 
 #include "effect/description.h"
@@ -13,10 +14,11 @@ namespace billow::compiler {
 // and what was expected, also where more particles would be born or alive than a pack may have.
 EffectDescription readEffect(const std::string& path);
 
-// ---- Parts of it, each for one member. Throw json::Error.
-EmitterDescription readEmitter(const json::Value& value, float duration);
+// ---- Parts of it, each for one member. Throw json::Error, and Error for pictures. `folder` is that of the
+// description, to which paths are relative.
+EmitterDescription readEmitter(const json::Value& value, float duration, const std::filesystem::path& folder);
 // What a particle is made of: fills what the record, the curves and the material have of it.
-void readPrimitive(const json::Value& value, EmitterDescription& emitter);
+void readPrimitive(const json::Value& value, const std::filesystem::path& folder, EmitterDescription& emitter);
 
 // A number, or [[time, number], ...].
 Keys readCurve(const json::Value& value, const json::Range& times, const json::Range& values);

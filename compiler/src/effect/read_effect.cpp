@@ -31,7 +31,7 @@ void checkAlive(const Value& root, const EffectDescription& effect) {
                   root.place(), alive, format::kMaxAlive));
 }
 
-EffectDescription readRoot(const Value& root) {
+EffectDescription readRoot(const Value& root, const std::filesystem::path& folder) {
   root.requireKeys({"$schema", "name", "seed", "duration", "loop", "prewarm", "emitters"});
   EffectDescription effect;
   effect.name = root.at("name").name("an effect's name");
@@ -44,7 +44,7 @@ EffectDescription readRoot(const Value& root) {
   if (emitters.size() > format::kMaxEmitters) list.fail(fmt::format("at most {} emitters", format::kMaxEmitters));
   std::set<std::string> names;
   for (const Value& emitter : emitters) {
-    effect.emitters.push_back(readEmitter(emitter, effect.duration));
+    effect.emitters.push_back(readEmitter(emitter, effect.duration, folder));
     if (!names.insert(effect.emitters.back().name).second) emitter.at("name").fail("a name that no other emitter has");
   }
   checkAlive(root, effect);
@@ -56,7 +56,7 @@ EffectDescription readRoot(const Value& root) {
 EffectDescription readEffect(const std::string& path) {
   try {
     const json::Document document(path);
-    EffectDescription effect = readRoot(document.root());
+    EffectDescription effect = readRoot(document.root(), std::filesystem::path(path).parent_path());
     effect.file = path;
     return effect;
   } catch (const json::FileError& error) {

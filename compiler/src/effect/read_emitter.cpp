@@ -116,7 +116,7 @@ void readBursts(const Value& value, double duration, EmitterDescription& emitter
 
 }  // namespace
 
-EmitterDescription readEmitter(const Value& value, float duration) {
+EmitterDescription readEmitter(const Value& value, float duration, const std::filesystem::path& folder) {
   value.requireKeys({"name", "shape", "position", "rate", "bursts", "lifetime", "velocity", "inheritedVelocity",
                      "forces", "primitive"});
   EmitterDescription emitter;
@@ -134,7 +134,7 @@ EmitterDescription readEmitter(const Value& value, float duration) {
   if (const auto velocity = value.find("velocity")) readVelocity(*velocity, record);
   if (const auto share = value.find("inheritedVelocity")) record.inheritance = share->single({-10, 10});
   if (const auto forces = value.find("forces")) readForces(*forces, record);
-  readPrimitive(value.at("primitive"), emitter);
+  readPrimitive(value.at("primitive"), folder, emitter);
   return emitter;
 }
 

@@ -31,8 +31,29 @@ void takeCurve(const Keys& keys, float& constant, Keys& row) {
   }
 }
 
-// [{"age": A, "stops": [[radius, [r, g, b]], ...]}, ...]
-std::vector<RampRow> readRamp(const Value& value, const Range& colours) {
+// A picture: radius along its width, age downward.
+std::vector<RampRow> rampOfPicture(const Image& picture, double most) {
+  std::vector<RampRow> ramp;
+  for (std::uint32_t row = 0; row < format::kRampAges; ++row) {
+    const double age = static_cast<double>(row) / (format::kRampAges - 1);
+    Keys colour;
+    for (std::uint32_t i = 0; i < format::kRampRadii; ++i) {
+      const double radius = static_cast<double>(i) / (format::kRampRadii - 1);
+      std::array<double, 3> value = picture.sample(radius, age, false);
+      for (double& component : value) component = std::clamp(component, 0.0, most);
+      colour.times.push_back(radius);
+      colour.values.push_back(value);
+    }
+    ramp.push_back({age, colour});
+  }
+  return ramp;
+}
+
+// The name of a picture, or [{"age": A, "stops": [[radius, [r, g, b]], ...]}, ...]
+std::vector<RampRow> readRamp(const Value& value, const Range& colours, const std::filesystem::path& folder) {
+  if (value.isString()) {
+    return rampOfPicture(readImage((folder / value.text("a picture *.exr or *.png")).string()), colours.high);
+  }
   std::vector<RampRow> ramp;
   for (const Value& row : value.items("a list of rows with age and stops")) {
     row.requireKeys({"age", "stops"});
@@ -44,14 +65,14 @@ std::vector<RampRow> readRamp(const Value& value, const Range& colours) {
   return ramp;
 }
 
-void readDiffuse(const Value& value, EmitterDescription& emitter) {
+void readDiffuse(const Value& value, const std::filesystem::path& folder, EmitterDescription& emitter) {
   value.requireKeys({"colour", "ramp", "occlusion"});
   if (const auto colour = value.find("colour")) {
     const Keys keys = readVectorCurve(*colour, kLife, kShare);
     setColour(keys.times.size() == 1 ? keys.values[0] : std::array<double, 3>{1, 1, 1}, emitter.record.diffuse);
     if (keys.times.size() > 1) emitter.diffuse = keys;
   }
-  if (const auto ramp = value.find("ramp")) emitter.diffuseRamp = readRamp(*ramp, kShare);
+  if (const auto ramp = value.find("ramp")) emitter.diffuseRamp = readRamp(*ramp, kShare, folder);
   if (const auto occlusion = value.find("occlusion")) emitter.material.occlusion = occlusion->single(kShare);
 }
 
@@ -75,7 +96,7 @@ Keys emissionKeys(const Keys& colour, const Keys& strength, const Keys& temperat
   return keys;
 }
 
-void readEmission(const Value& value, EmitterDescription& emitter) {
+void readEmission(const Value& value, const std::filesystem::path& folder, EmitterDescription& emitter) {
   value.requireKeys({"colour", "strength", "temperature", "ramp"});
   constexpr Range kFactor{0, 1000};  // two of them and a ramp stay in range
   Keys colour{{0}, {{1, 1, 1}}}, temperature;
@@ -84,7 +105,7 @@ void readEmission(const Value& value, EmitterDescription& emitter) {
   const Keys keys = emissionKeys(colour, readCurve(value.at("strength"), kLife, kFactor), temperature);
   setColour(keys.times.size() == 1 ? keys.values[0] : std::array<double, 3>{1, 1, 1}, emitter.record.emission);
   if (keys.times.size() > 1) emitter.emission = keys;
-  if (const auto ramp = value.find("ramp")) emitter.emissionRamp = readRamp(*ramp, kFactor);
+  if (const auto ramp = value.find("ramp")) emitter.emissionRamp = readRamp(*ramp, kFactor, folder);
 }
 
 void readRotation(const Value& value, EmitterDescription& emitter) {
@@ -123,15 +144,18 @@ void readNoise(const Value& value, EmitterDescription& emitter) {
   emitter.map = map;
 }
 
-void readDisplacement(const Value& value, EmitterDescription& emitter) {
-  value.requireKeys({"amount", "noise"});
+void readDisplacement(const Value& value, const std::filesystem::path& folder, EmitterDescription& emitter) {
+  value.requireKeys({"amount", "noise", "picture"});
   const Keys amount = readCurve(value.at("amount"), kLife, {0, kMostDisplacement});
   takeCurve(amount, emitter.record.displacement, emitter.displacement);
   if (!emitter.displacement.empty()) {  // the record's factor is bounded too
     emitter.record.displacement = static_cast<float>(kMostDisplacement);
     for (auto& key : emitter.displacement.values) key[0] /= kMostDisplacement;
   }
-  readNoise(value.at("noise"), emitter);
+  const auto picture = value.find("picture");
+  if (!picture) return readNoise(value.at("noise"), emitter);
+  if (value.find("noise")) picture->fail("either a picture or noise");
+  emitter.picture = readImage((folder / picture->text("a picture *.exr or *.png")).string());
 }
 
 // So that the bounding sphere has the radius 1.
@@ -178,7 +202,7 @@ void readDensity(const Value& value, EmitterDescription& emitter) {
 
 }  // namespace
 
-void readPrimitive(const Value& value, EmitterDescription& emitter) {
+void readPrimitive(const Value& value, const std::filesystem::path& folder, EmitterDescription& emitter) {
   value.requireKeys({"kind", "proportions", "radius", "radiusOverLife", "density", "diffuse", "emission", "rotation",
                      "displacement"});
   format::EmitterRecord& record = emitter.record;
@@ -190,10 +214,10 @@ void readPrimitive(const Value& value, EmitterDescription& emitter) {
   emitter.material.erosionFrequency = 1;
   std::fill_n(record.diffuse, 3, 0.8f);
   readDensity(value.at("density"), emitter);
-  if (const auto diffuse = value.find("diffuse")) readDiffuse(*diffuse, emitter);
-  if (const auto emission = value.find("emission")) readEmission(*emission, emitter);
+  if (const auto diffuse = value.find("diffuse")) readDiffuse(*diffuse, folder, emitter);
+  if (const auto emission = value.find("emission")) readEmission(*emission, folder, emitter);
   if (const auto rotation = value.find("rotation")) readRotation(*rotation, emitter);
-  if (const auto displacement = value.find("displacement")) readDisplacement(*displacement, emitter);
+  if (const auto displacement = value.find("displacement")) readDisplacement(*displacement, folder, emitter);
 }
 
 }  // namespace billow::compiler

@@ -18,6 +18,9 @@ struct SineCosine {
 // Of an angle in turns (1 is the full circle), |turns| < 2^50.
 SineCosine sineCosine(double turns);
 
+// The angle in turns, in [-1/2, 1/2], whose sine and cosine are in the ratio of these two; 0 where both are 0.
+double turnsOf(double sine, double cosine);
+
 // x^(1/3) for x in [0, 1], to 1e-12.
 double cubeRoot(double x);
 
