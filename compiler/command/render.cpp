@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "pack_lookup.h"
 #include "render_arguments.h"
 #include "render_image.h"
+#include "render_metavoxel.h"
 #include "render_setup.h"
 
 namespace billow::command {
@@ -97,47 +99,132 @@ Checked<void> checkOutputs(const RenderRequest& request, const std::string& inpu
 struct Job {
   RenderRequest request;
   format::Pack pack;
-  std::uint32_t volume;
+  std::vector<std::uint32_t> effects;
+  bool png = false;
+  // Where frames are asked for:
+  std::uint32_t volume = 0;
   runtime::GridChoice grids;
   std::vector<std::uint32_t> frames;
-  bool png;
 
   const format::VolumeRecord& record() const { return pack.volumes()[volume]; }
 };
 
-Checked<void> renderFrame(const Job& job, headless::Headless& gpu, runtime::Renderer& renderer, runtime::DrawInfo draw,
-                          std::uint32_t index) {
-  const auto frame = renderer.upload(job.pack, job.volume, index, {.grids = job.grids});
-  if (!frame) return tl::unexpected(toRefusal(frame.error(), job.request.pack));
-  draw.frame = frame->get();
-  const auto picture = gpu.render(renderer, draw);
-  gpu.waitIdle();
+// The device, and what draws on it.
+struct Painter {
+  std::unique_ptr<headless::Headless> gpu;
+  std::unique_ptr<runtime::Renderer> renderer;
+  std::optional<MetavoxelPainter> metavoxels;
+
+  runtime::Result<headless::Picture> render(const runtime::DrawInfo& draw, const Particles& particles) {
+    auto picture = metavoxels ? metavoxels->render(*gpu, *renderer, draw, particles) : gpu->render(*renderer, draw);
+    gpu->waitIdle();
+    return picture;
+  }
+};
+
+// `box` and `voxelSize` are those of what metavoxels will hold.
+Checked<Painter> makePainter(const Job& job, const runtime::WorldBox& box, double voxelSize) {
+  Painter painter;
+  auto gpu = headless::Headless::create({.device = job.request.device});
+  if (!gpu) return tl::unexpected(toRefusal(gpu.error(), job.request.pack));
+  painter.gpu = std::move(*gpu);
+  auto renderer = runtime::Renderer::create(painter.gpu->host(), {.gpuBudget = job.request.gpuBudget});
+  if (!renderer) return tl::unexpected(toRefusal(renderer.error(), job.request.pack));
+  painter.renderer = std::move(*renderer);
+  if (job.request.method == Method::direct) return painter;
+  // The other half is for the frame and its staging memory.
+  auto metavoxels = MetavoxelPainter::make(*painter.renderer, job.pack, box, job.request.voxelSize.value_or(voxelSize),
+                                           job.request.gpuBudget / 2);
+  if (!metavoxels) return tl::unexpected(toRefusal(metavoxels.error(), job.request.pack));
+  painter.metavoxels = std::move(*metavoxels);
+  return painter;
+}
+
+Checked<void> save(const Job& job, const runtime::Result<headless::Picture>& picture, const std::string& name) {
   if (!picture) return tl::unexpected(toRefusal(picture.error(), job.request.pack));
-  const std::string name = outputName(job.request, job.pack.framesOf(job.record())[index].number);
   writeWhole(name, job.png ? encodePng(*picture, job.request.exposure) : encodeExr(*picture));
   return {};
 }
 
-Checked<void> renderAll(const Job& job) {
+Checked<void> renderFrame(const Job& job, Painter& painter, runtime::DrawInfo draw, std::uint32_t index,
+                          const Particles& particles) {
+  const auto frame = painter.renderer->upload(job.pack, job.volume, index, {.grids = job.grids});
+  if (!frame) return tl::unexpected(toRefusal(frame.error(), job.request.pack));
+  draw.frame = frame->get();
+  const auto picture = painter.render(draw, particles);
+  return save(job, picture, outputName(job.request, job.pack.framesOf(job.record())[index].number));
+}
+
+Checked<void> renderFrames(const Job& job) {
   const auto look = runtime::suggestLook(job.pack, job.record(), job.grids);
   if (!look) return tl::unexpected(toRefusal(look.error(), job.request.pack));
   // The camera frames the whole sequence, so that a frame alone and within a range are the same picture.
-  const std::uint32_t lastFrame = job.record().frameCount - 1;
-  const runtime::DrawInfo draw = setUp(job.request, job.pack, job.record(), job.grids, *look, 0, lastFrame, job.png);
-  const auto gpu = headless::Headless::create({.device = job.request.device});
-  if (!gpu) return tl::unexpected(toRefusal(gpu.error(), job.request.pack));
-  const auto renderer = runtime::Renderer::create((*gpu)->host(), {.gpuBudget = job.request.gpuBudget});
-  if (!renderer) return tl::unexpected(toRefusal(renderer.error(), job.request.pack));
+  Stage stage = stageOf(job.pack, job.record(), job.grids, *look, 0, job.record().frameCount - 1);
+  const auto frames = job.pack.framesOf(job.record());
+  std::vector<Particles> particles;
+  for (const std::uint32_t index : job.frames) {
+    particles.push_back(particlesOf(job.pack, job.effects, frames[index].time));
+    addParticles(particles.back(), stage.box);
+  }
+  const runtime::DrawInfo draw = setUp(job.request, stage, *look, job.png);
+  auto painter = makePainter(job, stage.box, finestVoxel(job.pack, job.record(), job.grids));
+  if (!painter) return tl::unexpected(painter.error());
   // No prepare(): it builds the pipelines of every frame ahead, so that none is late. Here nobody waits for a frame,
   // and those that the chosen frames need are built when they are met.
   const bool progress = job.frames.size() > 1 && isatty(STDERR_FILENO) != 0;
   for (std::size_t i = 0; i < job.frames.size(); ++i) {
-    if (auto done = renderFrame(job, **gpu, **renderer, draw, job.frames[i]); !done) return done;
+    if (auto done = renderFrame(job, *painter, draw, job.frames[i], particles[i]); !done) return done;
     if (progress)
-      fmt::print(stderr, "\r{}/{} frames on {}{}", i + 1, job.frames.size(), (*gpu)->deviceName(),
+      fmt::print(stderr, "\r{}/{} frames on {}{}", i + 1, job.frames.size(), painter->gpu->deviceName(),
                  i + 1 == job.frames.size() ? "\n" : "");
   }
   return {};
+}
+
+// Effects without a volume, at one time.
+Checked<void> renderEffects(const Job& job) {
+  const Particles particles = particlesOf(job.pack, job.effects, *job.request.time);
+  Stage stage{.box = {}, .up = 'y', .burning = false, .ambientGiven = false};
+  addParticles(particles, stage.box);
+  for (const format::Particle& particle : particles) {
+    for (const float channel : particle.emission) stage.burning = stage.burning || channel > 0;
+  }
+  runtime::Look look;
+  look.scatteringOrders = 4;
+  const runtime::DrawInfo draw = setUp(job.request, stage, look, job.png);
+  auto painter = makePainter(job, stage.box, 0);
+  if (!painter) return tl::unexpected(painter.error());
+  return save(job, painter->render(draw, particles), job.request.output);
+}
+
+// The volume, its grids and frames that are asked for.
+Checked<void> chooseFrames(const std::string& input, Job& job) {
+  const RenderRequest& request = job.request;
+  const auto volume = findVolume(job.pack, request.volume.value_or(""));
+  if (!volume) return refuse(kCommandLine, fmt::format("{}: {}", request.pack, volume.error()));
+  job.volume = static_cast<std::uint32_t>(*volume);
+  auto frames = findFrames(job.pack, job.record(), request);
+  if (!frames) return tl::unexpected(frames.error());
+  job.frames = std::move(*frames);
+  if (auto outputs = checkOutputs(request, input, job.pack, job.record(), job.frames); !outputs) return outputs;
+  const auto grids = findGrids(job.pack, job.record(), request.grids);
+  if (!grids) return tl::unexpected(grids.error());
+  job.grids = *grids;
+  return {};
+}
+
+Checked<void> render(const std::string& input, Job& job) {
+  auto effects = findEffects(job.pack, job.request);
+  if (!effects) return tl::unexpected(effects.error());
+  job.effects = std::move(*effects);
+  if (!job.request.frames) {
+    if (sameFile(job.request.output, job.request.pack) || sameFile(job.request.output, input)) {
+      return refuse(kCommandLine, fmt::format("-o {}: that is the input itself", job.request.output));
+    }
+    return renderEffects(job);
+  }
+  if (auto chosen = chooseFrames(input, job); !chosen) return chosen;
+  return renderFrames(job);
 }
 
 int runRender(const RenderArguments& arguments) {
@@ -145,18 +232,10 @@ int runRender(const RenderArguments& arguments) {
   if (!request) return complain(request.error());
   auto pack = format::Pack::openFile(request->pack);
   if (!pack) return reportIssue(request->pack, pack.error());
-  const auto volume = findVolume(*pack, request->volume.value_or(""));
-  if (!volume) return complain({kCommandLine, fmt::format("{}: {}", request->pack, volume.error())});
-  const format::VolumeRecord& record = pack->volumes()[*volume];
-  const auto frames = findFrames(*pack, record, *request);
-  if (!frames) return complain(frames.error());
-  const auto outputs = checkOutputs(*request, arguments.input, *pack, record, *frames);
-  if (!outputs) return complain(outputs.error());
-  const auto grids = findGrids(*pack, record, request->grids);
-  if (!grids) return complain(grids.error());
   const bool png = std::filesystem::path(request->output).extension() == ".png";
-  const Job job{*request, std::move(*pack), *volume, *grids, *frames, png};
-  const auto done = renderAll(job);
+  Job job{
+      .request = *request, .pack = std::move(*pack), .effects = {}, .png = png, .volume = 0, .grids = {}, .frames = {}};
+  const auto done = render(arguments.input, job);
   return done ? kDone : complain(done.error());
 }
 
@@ -164,12 +243,13 @@ int runRender(const RenderArguments& arguments) {
 
 void addRender(CLI::App& app, Run& run) {
   auto arguments = std::make_shared<RenderArguments>();
-  CLI::App* command = app.add_subcommand("render", "Draw frames of a pack to PNG or EXR pictures");
+  CLI::App* command = app.add_subcommand("render", "Draw frames and effects of a pack to PNG or EXR pictures");
   command->footer(
       "EXR holds premultiplied linear RGBA (half) and depth Z along the view (single).\n"
       "Examples:\n"
       "  billow render fire.blw --frame 12 -o fire.png\n"
       "  billow render fire.blw --frame 5-12 -o fire.exr      writes fire_0005.exr to fire_0012.exr\n"
+      "  billow render smoke.blw --effect 'campfire smoke' --time 2 -o smoke.png\n"
       "Exit codes: 0 done, 1 command line, 2 a file cannot be read or written, 3 invalid pack or scene, 4 no usable "
       "GPU");
   addRenderOptions(*command, *arguments);

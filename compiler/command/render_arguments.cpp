@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "billow/format/effect.h"
 #include "billow/format/look.h"
 #include "command.h"
 
@@ -16,7 +17,9 @@ tl::unexpected<Refusal> refuse(int code, const std::string& message) {
 }
 
 Checked<void> applyTexts(const RenderArguments& arguments, RenderRequest& request) {
-  if (auto done = parseFrames(arguments.frames, request); !done) return done;
+  if (arguments.frames) {
+    if (auto done = parseFrames(*arguments.frames, request); !done) return done;
+  }
   if (arguments.size) {
     if (auto done = parseSize(*arguments.size, request); !done) return done;
   }
@@ -172,17 +175,48 @@ void addSourceOptions(CLI::App& command, RenderArguments& arguments) {
   command.add_option("--gpu-budget", arguments.direct.gpuBudget, "Bytes of GPU memory at most (default 1 GiB)")
       ->transform(CLI::AsSizeValue(false));
   command.add_option("--device", arguments.direct.device, "Vulkan device number (default: the fastest kind there is)");
-  // Not in the help: the one method there is.
-  command.add_option("--method", arguments.method)->group("");
+}
+
+void addMethodOptions(CLI::App& command, RenderArguments& arguments) {
+  command
+      .add_option("--method", arguments.method,
+                  "direct marches the volume's tree; metavoxel fills a light-aligned space, which effects need\n"
+                  "(default direct, with --effect metavoxel)")
+      ->check(CLI::IsMember({"direct", "metavoxel"}));
+  command.add_option("--effect", arguments.direct.effects, "An effect of the pack, beside the volume or alone");
+  command.add_option("--time", arguments.direct.time, "Without --frame: seconds after the effects' begin")
+      ->check(finite())
+      ->check(CLI::Range(0.0, format::kMaxEffectTime));
+  command
+      .add_option("--voxel-size", arguments.direct.voxelSize,
+                  "Of metavoxels, world units (default: the volume's, or a 256th of the effects' size)")
+      ->check(finite())
+      ->check(CLI::Range(1e-9, 1e9));
+}
+
+// What is to be drawn, and how.
+Checked<void> applyMethod(const RenderArguments& arguments, RenderRequest& request) {
+  request.effects = arguments.direct.effects;
+  request.time = arguments.direct.time;
+  request.voxelSize = arguments.direct.voxelSize;
+  request.frames = arguments.frames.has_value();
+  if (!request.frames && request.effects.empty()) {
+    return refuse(kCommandLine, "--frame of a volume, or --effect, must be given");
+  }
+  if (request.frames == request.time.has_value()) {
+    return refuse(kCommandLine, "--time says when effects are drawn without --frame: expected one of the two");
+  }
+  const bool effects = !request.effects.empty();
+  if (arguments.method == "direct" && effects) {
+    return refuse(kCommandLine, "--method is \"direct\"; effects are drawn by \"metavoxel\" alone");
+  }
+  request.method = effects || arguments.method == "metavoxel" ? Method::metavoxel : Method::direct;
+  return {};
 }
 
 }  // namespace
 
 Checked<RenderRequest> makeRequest(const RenderArguments& arguments) {
-  if (arguments.method != "direct") {
-    return refuse(kCommandLine,
-                  fmt::format("--method is \"{}\"; this version draws by \"direct\" alone", arguments.method));
-  }
   const std::string extension = std::filesystem::path(arguments.output).extension().string();
   if (extension != ".png" && extension != ".exr") {
     return refuse(kCommandLine,
@@ -196,6 +230,7 @@ Checked<RenderRequest> makeRequest(const RenderArguments& arguments) {
   }
   applyNumbers(arguments, request);
   if (auto done = applyTexts(arguments, request); !done) return tl::unexpected(done.error());
+  if (auto done = applyMethod(arguments, request); !done) return tl::unexpected(done.error());
   return request;
 }
 
@@ -204,7 +239,6 @@ void addRenderOptions(CLI::App& command, RenderArguments& arguments) {
       ->required()
       ->type_name("PACK|SCENE.json");
   command.add_option("--frame", arguments.frames, "Frame number as the source counts, or a range N-M")
-      ->required()
       ->type_name("N[-M]");
   command.add_option("-o,--output", arguments.output, "Picture to write; of a range, _NUMBER goes before .png or .exr")
       ->required()
@@ -212,6 +246,7 @@ void addRenderOptions(CLI::App& command, RenderArguments& arguments) {
   addPictureOptions(command, arguments);
   addLightOptions(command, arguments);
   addSourceOptions(command, arguments);
+  addMethodOptions(command, arguments);
 }
 
 }  // namespace billow::command

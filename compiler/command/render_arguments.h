@@ -12,9 +12,9 @@ namespace billow::command {
 
 // Options as texts, before they are checked; those that are given override the scene's.
 struct RenderArguments {
-  std::string input, frames, output;
-  std::optional<std::string> size, camera, sunDirection, sunColor, background, up, filter, albedo, ambient;
-  std::string method = "direct";
+  std::string input, output;
+  std::optional<std::string> frames, method, size, camera, sunDirection, sunColor, background, up, filter, albedo,
+      ambient;
   std::string shadows = "nearest";
   RenderRequest direct;  // what CLI11 checks by itself
   std::optional<float> fieldOfView, exposure, density, fire;

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <tl/expected.hpp>
+#include <vector>
 
 #include "billow/runtime/runtime.h"
 
@@ -43,9 +44,16 @@ struct GridNames {
   std::optional<std::string> extinction, temperature, flames;
 };
 
+enum class Method { direct, metavoxel };
+
 struct RenderRequest {
   std::string pack;
   std::optional<std::string> volume;  // needed where the pack has several
+  Method method = Method::direct;
+  std::vector<std::string> effects;  // drawn by metavoxels, beside the volume or alone
+  std::optional<double> time;        // of the effects where no frame is asked for, seconds
+  std::optional<double> voxelSize;   // of metavoxels, world units
+  bool frames = false;               // whether frames of a volume are asked for
   std::int32_t firstFrame = 0, lastFrame = 0;
   bool range = false;
   std::string output;

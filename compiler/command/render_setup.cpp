@@ -120,19 +120,29 @@ char risingAxis(const format::Pack& pack, const format::VolumeRecord& volume, co
   return rise(1) > rise(2) + 0.1 * size && rise(1) > 0 ? 'y' : 'z';
 }
 
+Stage stageOf(const format::Pack& pack, const format::VolumeRecord& volume, const runtime::GridChoice& grids,
+              const runtime::Look& suggested, std::uint32_t first, std::uint32_t last) {
+  return {.box = runtime::worldBox(pack, volume, grids, first, last),
+          .up = risingAxis(pack, volume, grids),
+          .burning = suggested.emissionScale > 0,
+          .ambientGiven = format::isSet(volume.look, format::kLookAmbient)};
+}
+
 runtime::DrawInfo setUp(const RenderRequest& request, const format::Pack& pack, const format::VolumeRecord& volume,
                         const runtime::GridChoice& grids, const runtime::Look& suggested, std::uint32_t first,
                         std::uint32_t last, bool opaque) {
-  const char up = request.up.value_or(risingAxis(pack, volume, grids));
-  const runtime::WorldBox box = runtime::worldBox(pack, volume, grids, first, last);
+  return setUp(request, stageOf(pack, volume, grids, suggested, first, last), suggested, opaque);
+}
+
+runtime::DrawInfo setUp(const RenderRequest& request, const Stage& stage, const runtime::Look& suggested, bool opaque) {
+  const char up = request.up.value_or(stage.up);
   runtime::DrawInfo draw;
   draw.width = request.width;
   draw.height = request.height;
   draw.colorFormat = runtime::ColorFormat::single;
-  draw.view = chooseView(request, box, up);
-  const bool ambientGiven = format::isSet(volume.look, format::kLookAmbient);
-  const bool burning = suggested.emissionScale > 0 && request.look.fire > 0;
-  draw.look = chooseLook(request.look, suggested, burning, ambientGiven);
+  draw.view = chooseView(request, stage.box, up);
+  const bool burning = stage.burning && request.look.fire > 0;
+  draw.look = chooseLook(request.look, suggested, burning, stage.ambientGiven);
   draw.sun = chooseSun(request, up, burning);
   draw.background = chooseBackground(request, burning, opaque);
   draw.quality.filter = request.filter;

@@ -12,8 +12,22 @@ namespace billow::command {
 // The axis along which the gas rises from the first to the last frame: 'z' unless y is clearly more so.
 char risingAxis(const format::Pack& pack, const format::VolumeRecord& volume, const runtime::GridChoice& grids);
 
-// Everything of a DrawInfo but the frame. [first, last] are frame indices that the camera must frame.
-// `opaque` asks for a background that fills the picture.
+// What is to be seen.
+struct Stage {
+  runtime::WorldBox box;
+  char up;            // where the request does not say
+  bool burning;       // it gives light itself
+  bool ambientGiven;  // by the pack
+};
+
+// Everything of a DrawInfo but the frame. `opaque` asks for a background that fills the picture.
+runtime::DrawInfo setUp(const RenderRequest& request, const Stage& stage, const runtime::Look& suggested, bool opaque);
+
+// A volume's; [first, last] are frame indices.
+Stage stageOf(const format::Pack& pack, const format::VolumeRecord& volume, const runtime::GridChoice& grids,
+              const runtime::Look& suggested, std::uint32_t first, std::uint32_t last);
+
+// The same for a volume. [first, last] are frame indices that the camera must frame.
 runtime::DrawInfo setUp(const RenderRequest& request, const format::Pack& pack, const format::VolumeRecord& volume,
                         const runtime::GridChoice& grids, const runtime::Look& suggested, std::uint32_t first,
                         std::uint32_t last, bool opaque);

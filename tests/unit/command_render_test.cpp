@@ -172,7 +172,7 @@ TEST_F(Render, SchemaListsWhatTheReaderTakes) {
 
 TEST_F(Render, RefusesWhatItCannotDo) {
   const std::string out = " -o '" + (folder_ / "x.png") + "'";
-  expectRefused("'" + pack_ + "' --frame 7 --method metavoxel" + out, 1, "metavoxel");
+  expectRefused("'" + pack_ + "' --frame 7 --method voxels" + out, 1, "--method");
   expectRefused("'" + pack_ + "' --frame 6" + out, 1, "7 to 8");
   expectRefused("'" + pack_ + "' --frame 8-7" + out, 1, "--frame");
   expectRefused("'" + pack_ + "' --frame 7 --size 0x9" + out, 1, "--size");

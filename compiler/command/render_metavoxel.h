@@ -1,0 +1,49 @@
+// Drawing by metavoxels: a space around what is to be seen, and the particles of effects.
+#ifndef BILLOW_COMMAND_RENDER_METAVOXEL_H
+#define BILLOW_COMMAND_RENDER_METAVOXEL_H
+
+#include <memory>
+#include <vector>
+
+#include "billow/headless/headless.h"
+#include "billow/runtime/look.h"
+#include "billow/runtime/metavoxel.h"
+#include "render_request.h"
+
+namespace billow::command {
+
+// What there is to draw at one moment.
+using Particles = std::vector<format::Particle>;
+
+// The effects of the pack that are asked for, by number. Refuses names that it has not.
+Checked<std::vector<std::uint32_t>> findEffects(const format::Pack& pack, const RenderRequest& request);
+// What is alive of them, seconds after their begin.
+Particles particlesOf(const format::Pack& pack, const std::vector<std::uint32_t>& effects, double time);
+
+// The box grown to hold the particles' bounding spheres.
+void addParticles(const Particles& particles, runtime::WorldBox& box);
+
+// Edge of the smallest voxel of the grids, world units; 0 where the volume has none of them.
+double finestVoxel(const format::Pack& pack, const format::VolumeRecord& volume, const runtime::GridChoice& grids);
+
+class MetavoxelPainter {
+ public:
+  // A space that holds `box` from any direction, its voxels at least `voxelSize` (0: a 256th of the box).
+  static runtime::Result<MetavoxelPainter> make(runtime::Renderer& renderer, const format::Pack& pack,
+                                                const runtime::WorldBox& box, double voxelSize,
+                                                std::uint64_t memoryBudget);
+
+  // `draw` as for the direct method; its frame may be null. Without shadows light passes unhindered.
+  runtime::Result<headless::Picture> render(headless::Headless& gpu, runtime::Renderer& renderer,
+                                            const runtime::DrawInfo& draw, const Particles& particles);
+
+ private:
+  std::unique_ptr<runtime::Metavoxels> metavoxels_;
+  std::array<double, 3> center_{};
+  float voxelSize_ = 0;
+  std::uint32_t mostEntries_ = 0;
+};
+
+}  // namespace billow::command
+
+#endif  // BILLOW_COMMAND_RENDER_METAVOXEL_H
