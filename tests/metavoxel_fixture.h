@@ -109,8 +109,9 @@ class MetavoxelTest : public GpuTest {
   std::unique_ptr<runtime::Metavoxels> make(const MetavoxelConfig& config) {
     return valueOf(runtime::Metavoxels::create(*renderer_, config), "metavoxels");
   }
-  headless::Picture render(runtime::Metavoxels& metavoxels, const MetavoxelDraw& draw) {
-    return valueOf(gpu().render(*renderer_, metavoxels, draw), "render");
+  headless::Picture render(runtime::Metavoxels& metavoxels, const MetavoxelDraw& draw,
+                           std::span<const float> sceneDepth = {}) {
+    return valueOf(gpu().render(*renderer_, metavoxels, draw, sceneDepth), "render");
   }
   // One picture by metavoxels of their own.
   headless::Picture renderOnce(const MetavoxelConfig& config, const MetavoxelDraw& draw) {

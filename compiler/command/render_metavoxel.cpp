@@ -128,7 +128,7 @@ runtime::Result<headless::Picture> MetavoxelPainter::render(headless::Headless& 
   info.width = draw.width;
   info.height = draw.height;
   info.colorFormat = draw.colorFormat;
-  auto picture = gpu.render(renderer, *metavoxels_, info);
+  auto picture = gpu.render(renderer, *metavoxels_, info, {});
   if (!picture) return picture;
   const runtime::MetavoxelStats stats = metavoxels_->stats();
   if (stats.drawn == stats.occupied && stats.listEntries <= mostEntries_) return picture;

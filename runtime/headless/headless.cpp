@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "device.h"
+#include "target.h"
 
 namespace billow::headless {
 namespace {
@@ -19,101 +19,6 @@ float halfToFloat(std::uint16_t half) {
   if (exponent == 0) return sign * std::ldexp(static_cast<float>(mantissa), -24);
   return sign * std::ldexp(static_cast<float>(mantissa + 1024), exponent - 25);
 }
-
-// Host-visible memory with a buffer, or device memory with an image; lives as long as one call.
-class Target {
- public:
-  explicit Target(const VulkanDevice& device) : device_(device) {}
-  Target(const Target&) = delete;
-  Target& operator=(const Target&) = delete;
-  ~Target() {
-    const VkDevice device = device_.host.device;
-    if (view != VK_NULL_HANDLE) device_.vk.vkDestroyImageView(device, view, nullptr);
-    if (image != VK_NULL_HANDLE) device_.vk.vkDestroyImage(device, image, nullptr);
-    if (buffer != VK_NULL_HANDLE) device_.vk.vkDestroyBuffer(device, buffer, nullptr);
-    if (memory_ != VK_NULL_HANDLE) device_.vk.vkFreeMemory(device, memory_, nullptr);
-  }
-
-  Result<void> makeBuffer(VkDeviceSize size, VkBufferUsageFlags usage) {
-    auto info = begin<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
-    info.size = size;
-    info.usage = usage;
-    if (device_.vk.vkCreateBuffer(device_.host.device, &info, nullptr, &buffer) != VK_SUCCESS) {
-      return gpuError("vkCreateBuffer failed");
-    }
-    VkMemoryRequirements requirements{};
-    device_.vk.vkGetBufferMemoryRequirements(device_.host.device, buffer, &requirements);
-    const VkMemoryPropertyFlags visible = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
-    if (auto done = allocate(requirements, visible); !done) return done;
-    device_.vk.vkBindBufferMemory(device_.host.device, buffer, memory_, 0);
-    void* data = nullptr;
-    if (device_.vk.vkMapMemory(device_.host.device, memory_, 0, VK_WHOLE_SIZE, 0, &data) != VK_SUCCESS) {
-      return gpuError("vkMapMemory failed");
-    }
-    mapped = static_cast<float*>(data);
-    return {};
-  }
-
-  Result<void> makeImage(VkFormat format, std::uint32_t width, std::uint32_t height) {
-    auto info = begin<VkImageCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO);
-    info.imageType = VK_IMAGE_TYPE_2D;
-    info.format = format;
-    info.extent = {width, height, 1};
-    info.mipLevels = info.arrayLayers = 1;
-    info.samples = VK_SAMPLE_COUNT_1_BIT;
-    info.usage = VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT;
-    if (device_.vk.vkCreateImage(device_.host.device, &info, nullptr, &image) != VK_SUCCESS) {
-      return gpuError("vkCreateImage failed");
-    }
-    VkMemoryRequirements requirements{};
-    device_.vk.vkGetImageMemoryRequirements(device_.host.device, image, &requirements);
-    if (auto done = allocate(requirements, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT); !done) return done;
-    device_.vk.vkBindImageMemory(device_.host.device, image, memory_, 0);
-    auto viewInfo = begin<VkImageViewCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO);
-    viewInfo.image = image;
-    viewInfo.viewType = VK_IMAGE_VIEW_TYPE_2D;
-    viewInfo.format = format;
-    viewInfo.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
-    if (device_.vk.vkCreateImageView(device_.host.device, &viewInfo, nullptr, &view) != VK_SUCCESS) {
-      return gpuError("vkCreateImageView failed");
-    }
-    return {};
-  }
-
-  VkDeviceAddress address() const {
-    auto info = begin<VkBufferDeviceAddressInfo>(VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO);
-    info.buffer = buffer;
-    return device_.vk.vkGetBufferDeviceAddress(device_.host.device, &info);
-  }
-
-  VkBuffer buffer = VK_NULL_HANDLE;
-  VkImage image = VK_NULL_HANDLE;
-  VkImageView view = VK_NULL_HANDLE;
-  float* mapped = nullptr;
-
- private:
-  Result<void> allocate(const VkMemoryRequirements& requirements, VkMemoryPropertyFlags wanted) {
-    VkPhysicalDeviceMemoryProperties types{};
-    device_.vk.vkGetPhysicalDeviceMemoryProperties(device_.host.physicalDevice, &types);
-    auto flags = begin<VkMemoryAllocateFlagsInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO);
-    flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
-    auto info = begin<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
-    info.pNext = buffer != VK_NULL_HANDLE ? &flags : nullptr;
-    info.allocationSize = requirements.size;
-    for (; info.memoryTypeIndex < types.memoryTypeCount; ++info.memoryTypeIndex) {
-      const bool allowed = (requirements.memoryTypeBits >> info.memoryTypeIndex & 1u) != 0;
-      if (allowed && (types.memoryTypes[info.memoryTypeIndex].propertyFlags & wanted) == wanted) break;
-    }
-    if (info.memoryTypeIndex == types.memoryTypeCount) return gpuError("no memory type fits");
-    if (device_.vk.vkAllocateMemory(device_.host.device, &info, nullptr, &memory_) != VK_SUCCESS) {
-      return gpuError("the GPU is out of memory");
-    }
-    return {};
-  }
-
-  const VulkanDevice& device_;
-  VkDeviceMemory memory_ = VK_NULL_HANDLE;
-};
 
 class HeadlessImpl final : public Headless {
  public:
@@ -154,9 +59,39 @@ class HeadlessImpl final : public Headless {
     return drawPicture(renderer, draw, draw.frame->uploadValue(), [&] { return renderer.record(commands_, draw); });
   }
 
-  Result<Picture> render(runtime::Renderer& renderer, runtime::Metavoxels& metavoxels,
-                         runtime::MetavoxelDraw draw) override {
-    return drawPicture(renderer, draw, uploadOf(draw), [&] { return metavoxels.record(commands_, draw); });
+  Result<Picture> render(runtime::Renderer& renderer, runtime::Metavoxels& metavoxels, runtime::MetavoxelDraw draw,
+                         std::span<const float> sceneDepth) override {
+    Target scene(device_), staging(device_);
+    if (!sceneDepth.empty()) {
+      const VkDeviceSize bytes = sceneDepth.size_bytes();
+      if (auto done = staging.makeBuffer(bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT); !done) {
+        return tl::unexpected(done.error());
+      }
+      if (auto done = scene.makeImage(VK_FORMAT_R32_SFLOAT, draw.width, draw.height); !done) {
+        return tl::unexpected(done.error());
+      }
+      std::memcpy(staging.mapped, sceneDepth.data(), bytes);
+      draw.sceneDepth = scene.view;
+    }
+    return drawPicture(renderer, draw, uploadOf(draw), [&] {
+      if (!sceneDepth.empty()) fillImage(scene.image, draw.width, draw.height, staging.buffer);
+      return metavoxels.record(commands_, draw);
+    });
+  }
+
+  Result<std::vector<float>> readShadow(runtime::Renderer& renderer, const runtime::Metavoxels& metavoxels) override {
+    const runtime::MetavoxelShadow shadow = metavoxels.shadow();
+    const std::size_t texels = std::size_t{shadow.size} * shadow.size;
+    Target out(device_);
+    if (auto done = out.makeBuffer(texels * 4, VK_BUFFER_USAGE_TRANSFER_DST_BIT); !done) {
+      return tl::unexpected(done.error());
+    }
+    beginCommands();
+    copyImage(shadow.image, shadow.size, shadow.size, out.buffer, 0);
+    barrier(VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_2_HOST_BIT,
+            VK_ACCESS_2_HOST_READ_BIT);
+    if (auto done = submitAndWait(renderer, 0); !done) return tl::unexpected(done.error());
+    return std::vector<float>(out.mapped, out.mapped + texels);
   }
 
   Result<std::vector<double>> time(runtime::Renderer& renderer, runtime::DrawInfo draw, std::uint32_t count) override {
@@ -301,22 +236,35 @@ class HeadlessImpl final : public Headless {
   }
 
   void toGeneral(VkImage color, VkImage depth) {
-    VkImageMemoryBarrier2 barriers[2];
-    for (int i = 0; i < 2; ++i) {
-      barriers[i] = begin<VkImageMemoryBarrier2>(VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2);
-      // The write stage orders this draw after the one before it, which wrote the same images.
-      barriers[i].srcStageMask = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
-      barriers[i].dstStageMask = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
-      barriers[i].dstAccessMask = VK_ACCESS_2_SHADER_WRITE_BIT;
-      barriers[i].newLayout = VK_IMAGE_LAYOUT_GENERAL;
-      barriers[i].srcQueueFamilyIndex = barriers[i].dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-      barriers[i].image = i == 0 ? color : depth;
-      barriers[i].subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+    for (const VkImage image : {color, depth}) {
+      // The compute stage orders this draw after the one before it, which wrote the same images.
+      toGeneral(image, VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT, VK_ACCESS_2_SHADER_WRITE_BIT);
     }
+  }
+
+  // What the image held is lost; the next access is by this stage.
+  void toGeneral(VkImage image, VkPipelineStageFlags2 stage, VkAccessFlags2 access) {
+    auto change = begin<VkImageMemoryBarrier2>(VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2);
+    change.srcStageMask = change.dstStageMask = stage;
+    change.dstAccessMask = access;
+    change.newLayout = VK_IMAGE_LAYOUT_GENERAL;
+    change.srcQueueFamilyIndex = change.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    change.image = image;
+    change.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
     auto info = begin<VkDependencyInfo>(VK_STRUCTURE_TYPE_DEPENDENCY_INFO);
-    info.imageMemoryBarrierCount = 2;
-    info.pImageMemoryBarriers = barriers;
+    info.imageMemoryBarrierCount = 1;
+    info.pImageMemoryBarriers = &change;
     device_.vk.vkCmdPipelineBarrier2(commands_, &info);
+  }
+
+  void fillImage(VkImage image, std::uint32_t width, std::uint32_t height, VkBuffer from) {
+    toGeneral(image, VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_WRITE_BIT);
+    VkBufferImageCopy copy{};
+    copy.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
+    copy.imageExtent = {width, height, 1};
+    device_.vk.vkCmdCopyBufferToImage(commands_, from, image, VK_IMAGE_LAYOUT_GENERAL, 1, &copy);
+    barrier(VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_WRITE_BIT,
+            VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT, VK_ACCESS_2_SHADER_READ_BIT);
   }
 
   void barrier(VkPipelineStageFlags2 fromStage, VkAccessFlags2 fromAccess, VkPipelineStageFlags2 toStage,

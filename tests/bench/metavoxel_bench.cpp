@@ -227,7 +227,7 @@ void measure(headless::Headless& gpu, const format::Pack& pack, const Options& o
              static_cast<double>(metavoxels->bytesAllocated()) / 1e6);
   std::fflush(stdout);
   if (scene.spheres == 1000 && !options.picture.empty() && scene.spread > 250) {
-    writePicture(options.picture, valueOf(gpu.render(*renderer, *metavoxels, draw)));
+    writePicture(options.picture, valueOf(gpu.render(*renderer, *metavoxels, draw, {})));
   }
   gpu.waitIdle();
 }

@@ -151,5 +151,62 @@ TEST_F(MetavoxelLight, ShadowFallsFromTheSun) {
   EXPECT_LT(light({near, far}, false), 0.4f * light({far}, false));
 }
 
+TEST_F(MetavoxelLight, SceneEndsRays) {
+  // A plane through the middle of a soft ball, at a different depth for each half of the picture.
+  const std::vector<Particle> particles{ball({0, 0, 0}, 3, 0.4f)};
+  MetavoxelDraw draw = smallDraw();
+  draw.view = runtime::lookAt({0, 0, 20}, {0, 0, 0}, {0, 1, 0}, 20);
+  draw.particles = particles;
+  std::vector<float> depths(std::size_t{draw.width} * draw.height);
+  for (std::size_t i = 0; i < depths.size(); ++i) depths[i] = i % draw.width < draw.width / 2 ? 20.0f : 10.0f;
+  const auto metavoxels = make(smallConfig());
+  const headless::Picture whole = render(*metavoxels, draw), cut = render(*metavoxels, draw, depths);
+  const auto depth = [](const headless::Picture& picture, std::size_t pixel) {
+    return -std::log1p(-double{picture.rgba[pixel * 4 + 3]});
+  };
+  // Rays near the axis are halved by the plane; those aslant are not.
+  for (std::uint32_t row = 22; row < 26; ++row) {
+    const std::size_t left = std::size_t{row} * 48 + 23, right = left + 1;
+    EXPECT_NEAR(depth(cut, left) / depth(whole, left), 0.5, 0.01) << "half of the ball lies before the plane";
+    EXPECT_EQ(cut.rgba[right * 4 + 3], 0) << "all of it lies behind the plane";
+  }
+}
+
+TEST_F(MetavoxelLight, ShadowOnTheSceneIsTheDepthOfTheSpace) {
+  // Two balls one above the other, and a third beside them.
+  const std::vector<Particle> particles{ball({0, 2.5f, 0}, 1.5f, 0.4f), ball({0, -2, 0}, 2, 0.3f),
+                                        ball({-3, 0, 2}, 1, 1)};
+  MetavoxelDraw draw = smallDraw();
+  draw.sun.direction = {0, 1, 0};
+  draw.particles = particles;
+  const auto metavoxels = make(smallConfig());
+  render(*metavoxels, draw);
+  const runtime::MetavoxelShadow image = metavoxels->shadow();
+  std::vector<float> shadow = valueOf(gpu().readShadow(*renderer_, *metavoxels), "shadow");
+  for (double x = -4.5; x < 4.5; x += 0.1) {
+    for (double z = -4.5; z < 4.5; z += 0.1) {
+      const double world[4] = {x, 17, z, 1};
+      double texel[2] = {};
+      for (std::size_t row = 0; row < 2; ++row) {
+        for (std::size_t i = 0; i < 4; ++i) texel[row] += image.toTexel[row][i] * world[i];
+        EXPECT_NEAR(texel[row] - std::floor(texel[row]), 0.5, 1e-6) << "voxels' centres lie at multiples of 0.1";
+      }
+      double expected = 0;
+      for (const Particle& particle : particles) {
+        const double apart = std::pow(x - double{particle.center[0]}, 2) + std::pow(z - double{particle.center[2]}, 2);
+        const double r = double{particle.radius}, a = std::sqrt(std::max(r * r - apart, 0.0));
+        expected += double{particle.extinction} * 4 * a * a * a / (3 * r * r);
+      }
+      const auto at = static_cast<std::size_t>(texel[1]) * image.size + static_cast<std::size_t>(texel[0]);
+      EXPECT_NEAR(shadow[at], expected, 0.012) << x << ' ' << z;
+    }
+  }
+  // A shadow of the draw before does not stay.
+  draw.particles = std::span(particles).first(1);
+  render(*metavoxels, draw);
+  shadow = valueOf(gpu().readShadow(*renderer_, *metavoxels), "shadow");
+  EXPECT_NEAR(*std::max_element(shadow.begin(), shadow.end()), 0.4 * 4.0 / 3 * 1.5, 0.02);
+}
+
 }  // namespace
 }  // namespace billow::tests

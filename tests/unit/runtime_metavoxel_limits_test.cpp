@@ -18,7 +18,7 @@ class MetavoxelLimits : public MetavoxelTest {
     return made ? ErrorCode::vulkan : made.error().code;
   }
   std::string refusal(runtime::Metavoxels& metavoxels, const MetavoxelDraw& draw) {
-    const auto drawn = gpu().render(*renderer_, metavoxels, draw);
+    const auto drawn = gpu().render(*renderer_, metavoxels, draw, {});
     EXPECT_FALSE(drawn);
     return drawn ? "" : drawn.error().message;
   }

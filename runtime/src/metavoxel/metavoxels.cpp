@@ -84,6 +84,7 @@ class MetavoxelsImpl final : public Metavoxels {
       recordAll(commands, draw, *steps);
       next_ = (next_ + 1) % config_.recordsInFlight;
       ++draws_;
+      space_ = steps->space;
       return {};
     });
   }
@@ -104,7 +105,17 @@ class MetavoxelsImpl final : public Metavoxels {
   }
 
   MetavoxelShadow shadow() const override {
-    return {.view = resources_.shadow.view(), .size = resources_.sizes().shadowEdge()};
+    MetavoxelShadow shadow{
+        .image = resources_.shadow.handle(), .view = resources_.shadow.view(), .size = resources_.sizes().shadowEdge()};
+    for (std::size_t row = 0; row < 2 && draws_ > 0; ++row) {
+      double offset = space_.half;
+      for (std::size_t i = 0; i < 3; ++i) {
+        shadow.toTexel[row][i] = space_.axes[row][i] / space_.voxel;
+        offset -= shadow.toTexel[row][i] * space_.center[i];
+      }
+      shadow.toTexel[row][3] = offset;
+    }
+    return shadow;
   }
   std::uint32_t poolSlots() const override { return resources_.sizes().slots(); }
   std::uint64_t bytesAllocated() const override { return resources_.bytes(); }
@@ -343,6 +354,7 @@ class MetavoxelsImpl final : public Metavoxels {
   MetavoxelPipelines pipelines_;
   std::uint32_t next_ = 0;   // of the draws in flight
   std::uint32_t draws_ = 0;  // recorded so far
+  Space space_{};            // of the last one
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -50,9 +51,12 @@ class Headless {
   virtual Result<std::vector<double>> time(runtime::Renderer& renderer, runtime::DrawInfo draw,
                                            std::uint32_t count) = 0;
 
-  // The same with metavoxels of this renderer.
+  // The same with metavoxels of this renderer. `sceneDepth` is one a pixel, or empty for none.
   virtual Result<Picture> render(runtime::Renderer& renderer, runtime::Metavoxels& metavoxels,
-                                 runtime::MetavoxelDraw draw) = 0;
+                                 runtime::MetavoxelDraw draw, std::span<const float> sceneDepth) = 0;
+
+  // The texels of Metavoxels::shadow() after a draw, row by row.
+  virtual Result<std::vector<float>> readShadow(runtime::Renderer& renderer, const runtime::Metavoxels& metavoxels) = 0;
 
   // Milliseconds between MetavoxelDraw::timestamps, one row a draw.
   virtual Result<std::vector<PassTimes>> time(runtime::Renderer& renderer, runtime::Metavoxels& metavoxels,

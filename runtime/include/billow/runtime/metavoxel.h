@@ -93,9 +93,13 @@ struct MetavoxelStats {
 
 // The shadow that the space casts on the scene.
 struct MetavoxelShadow {
+  VkImage image = VK_NULL_HANDLE;
   VkImageView view = VK_NULL_HANDLE;  // R32F in VK_IMAGE_LAYOUT_GENERAL: optical depth of the whole space, a texel a
                                       // column of voxels; written anew by each draw
   std::uint32_t size = 0;             // texels along both edges
+  // Of the draw recorded last, a row each for x and y: texel = dot(row, (world, 1)), whole numbers and a half at their
+  // centres.
+  std::array<std::array<double, 4>, 2> toTexel{};
 };
 
 // One space. Used from one thread at a time, destroyed before its Renderer and when no commands that use it are
