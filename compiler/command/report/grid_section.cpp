@@ -58,7 +58,7 @@ std::string curvesCard(const ReportGrid& grid, std::size_t number, int effort) {
   card += costTable(grid);
   return card +
          fmt::format(
-             R"(<p class="note">Curves: frame {}, the grid's worst; each encoding alone, with as many bits as a brick needs, beside constant bricks; and the mix of all. BC7 at effort {}. Counted are index and headers as this pack has them, payloads and masks before equal ones are shared, and no limit on single voxels holds; the pack's own points (small dots: its other frames) count what it holds.</p></div>)",
+             R"(<p class="note">Curves: frame {}, the grid's worst; each encoding alone, with as many bits as a brick needs, beside constant bricks; and the mix that --psnr chooses (without local bricks, which only --gpu-budget takes). BC7 at effort {}. Counted are index and headers as this pack has them, payloads and masks before equal ones are shared, and no limit on single voxels holds; the pack's own points (small dots: its other frames) count what it holds.</p></div>)",
              frame.row.frame, effort);
 }
 

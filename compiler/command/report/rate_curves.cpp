@@ -50,8 +50,8 @@ class Curves {
   }
 
   RateCurve mix() const {
-    RateCurve curve = draw(trials_);
-    curve.name = "mix of all";
+    RateCurve curve = draw(withoutLocal());
+    curve.name = "mix of --psnr";
     curve.colour = "mix";
     return curve;
   }
@@ -77,6 +77,20 @@ class Curves {
         trials_[i].push_back({bytes, candidate.squaredError, candidate.maxError});
       }
     }
+  }
+
+  // What --psnr may choose from: local bricks are for --gpu-budget alone.
+  std::vector<std::vector<Choice>> withoutLocal() const {
+    std::size_t begin = 0, end = 0;
+    for (const EncodingFamily& family : encodingFamilies()) {
+      if (format::isLocal(family.first)) end = begin + family.tried;
+      if (end == 0) begin += family.tried;
+    }
+    std::vector<std::vector<Choice>> choices = trials_;
+    for (std::vector<Choice>& brick : choices) {
+      brick.erase(brick.begin() + static_cast<std::ptrdiff_t>(begin), brick.begin() + static_cast<std::ptrdiff_t>(end));
+    }
+    return choices;
   }
 
   double voxels() const { return static_cast<double>(source_.activeVoxels); }

@@ -58,7 +58,7 @@ struct ReportGrid {
   std::vector<ReportFrame> frames;
   std::vector<WorstBrick> worst;  // descending
   std::size_t curveFrame = 0;     // of `frames`: the one the curves are measured on
-  std::vector<RateCurve> curves;  // by encoding family, then the mix of all
+  std::vector<RateCurve> curves;  // by encoding family, then the mix that --psnr chooses
 };
 
 // Stored bytes of the pages that a frame needs.
