@@ -6,6 +6,8 @@
 #define BILLOW_COMPILER_ENCODE_BC7_FIT_INL_H
 #endif
 
+#include <type_traits>
+
 #include "encode/bc7_lines-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -14,6 +16,18 @@ namespace billow::compiler::HWY_NAMESPACE {
 // Numbers of the pairs of up to four channels, a channel with itself included.
 inline constexpr int kPairs = 10;
 inline constexpr int kPairOf[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}};
+
+// Calls function(first of kLanes blocks, how their texels count) until all blocks are done.
+template <class Function>
+HWY_INLINE void forEachLane(const BlockTexels& texels, const Function& function) {
+  for (std::uint32_t lane = 0; lane < kBlockLanes; lane += kLanes) {
+    if (texels.allActive) {
+      function(lane, std::integral_constant<Weights, Weights::none>());
+    } else {
+      function(lane, std::integral_constant<Weights, Weights::channel>());
+    }
+  }
+}
 
 // Divides by the largest component; 1 in all channels where there is none.
 template <int kChannels>

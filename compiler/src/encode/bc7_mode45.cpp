@@ -136,13 +136,7 @@ void tryLanes(const BlockTexels& texels, std::uint32_t lane, const Bc7Search& se
 }
 
 void tryModes4And5(const BlockTexels& texels, const Bc7Search& search, Bc7Fits& fits) {
-  for (std::uint32_t lane = 0; lane < kBlockLanes; lane += kLanes) {
-    if (texels.allActive) {
-      tryLanes<Weights::none>(texels, lane, search, fits);
-    } else {
-      tryLanes<Weights::channel>(texels, lane, search, fits);
-    }
-  }
+  forEachLane(texels, [&](std::uint32_t lane, auto weights) { tryLanes<weights()>(texels, lane, search, fits); });
 }
 
 }  // namespace

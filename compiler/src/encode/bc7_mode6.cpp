@@ -33,13 +33,7 @@ void fitLanes(const BlockTexels& texels, std::uint32_t lane, const Bc7Search& se
 }
 
 void fitMode6(const BlockTexels& texels, const Bc7Search& search, Bc7Fits& fits) {
-  for (std::uint32_t lane = 0; lane < kBlockLanes; lane += kLanes) {
-    if (texels.allActive) {
-      fitLanes<Weights::none>(texels, lane, search, fits);
-    } else {
-      fitLanes<Weights::channel>(texels, lane, search, fits);
-    }
-  }
+  forEachLane(texels, [&](std::uint32_t lane, auto weights) { fitLanes<weights()>(texels, lane, search, fits); });
 }
 
 }  // namespace
