@@ -10,6 +10,7 @@
 #include "compile_report.h"
 #include "import_options.h"
 #include "progress.h"
+#include "stages.h"
 
 namespace billow::command {
 namespace {
@@ -30,6 +31,9 @@ struct Arguments {
 };
 
 int runCompile(const Arguments& arguments) {
+  if (arguments.metric == "depth" && !arguments.psnr && !arguments.budget.any()) {
+    throw compiler::Error(compiler::Fault::commandLine, "--metric depth needs --psnr, --gpu-budget or --disk-budget");
+  }
   compiler::CompileOptions options;
   options.import = importOptions(arguments.import);
   options.import.framesPerSecond = arguments.framesPerSecond;
@@ -75,25 +79,23 @@ void addCompile(CLI::App& app, Run& run) {
       ->check(finiteNumber())
       ->check(CLI::PositiveNumber)
       ->type_name("E");
-  CLI::Option* metric = command
-                            ->add_option("--metric", arguments->metric,
-                                         "What --psnr is of: voxel, or depth: integrals along rays of nine directions")
-                            ->check(CLI::IsMember({"voxel", "depth"}))
-                            ->needs(psnr)
-                            ->capture_default_str();
+  command
+      ->add_option("--metric", arguments->metric,
+                   "What the error is of: voxel, or depth: integrals along rays of nine "
+                   "directions (with --psnr or a budget)")
+      ->check(CLI::IsMember({"voxel", "depth"}))
+      ->capture_default_str();
   command
       ->add_option("--gpu-budget", arguments->budget.gpu,
                    "GPU bytes of the whole pack, all frames and grids, at most; the error is the least that fits")
       ->transform(CLI::AsSizeValue(false))
       ->excludes(psnr)
-      ->excludes(metric)
       ->type_name("BYTES");
   command
       ->add_option("--disk-budget", arguments->budget.disk,
                    "Bytes of the file at most; the error is the least that fits")
       ->transform(CLI::AsSizeValue(false))
       ->excludes(psnr)
-      ->excludes(metric)
       ->type_name("BYTES");
   command->add_option("--fps", arguments->framesPerSecond, "Frames per second of the sequence [24, or the manifest's]")
       ->check(finiteNumber())

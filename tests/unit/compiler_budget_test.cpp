@@ -9,7 +9,6 @@
 #include <random>
 
 #include "billow/format/pack.h"
-#include "choose/disk_estimate.h"
 #include "choose/size_curve.h"
 #include "compile.h"
 #include "import/vdb_write.h"
@@ -24,17 +23,6 @@ TEST(Ladder, PositionIsItsInverse) {
     EXPECT_NEAR(positionOf(ladderMultiplier(position)), position, 1e-9);
     EXPECT_NEAR(std::log2(ladderMultiplier(position)), position / 4, 0.006);
   }
-}
-
-TEST(DiskEstimate, LogarithmAndEntropyAreNearTheTrueOnes) {
-  for (const std::uint32_t value : {1u, 2u, 3u, 7u, 100u, 511u, 512u, 70000u, 0xffffffffu}) {
-    EXPECT_NEAR(log2In256ths(value) / 256.0, std::log2(static_cast<double>(value)), 0.01) << value;
-  }
-  std::array<std::uint32_t, 16> even;
-  even.fill(32);
-  EXPECT_EQ(entropyBytes(even), 256u);
-  const std::array<std::uint32_t, 3> one = {0, 512, 0};
-  EXPECT_EQ(entropyBytes(one), 0u);
 }
 
 // Turbulent bricks; those with x in the upper half stand still, the others change with `frame`, whose noise is scaled
@@ -146,6 +134,76 @@ TEST_F(BudgetTest, GpuAndDiskBudgetsAreKeptAndUsed) {
   EXPECT_LE(report.fileBytes, 100000u);
   EXPECT_GE(report.fileBytes, 97000u);
   EXPECT_EQ(report.fileBytes, std::filesystem::file_size(folder_ + "/a.blw"));
+}
+
+double squaredError(const CompileReport& report) {
+  double sum = 0;
+  for (const EncodingTally& tally : report.grids[0].encodings) sum += tally.squaredError;
+  return sum;
+}
+
+TEST_F(BudgetTest, ADiskBudgetHasLessErrorThanAPsnrThatTakesAsMuch) {
+  addHalfStill(4);
+  CompileOptions options;
+  options.quality.psnr = 38;
+  const CompileReport byPsnr = compileTo("a.blw", options);
+  options.budget.disk = byPsnr.fileBytes;
+  const CompileReport byBudget = compileTo("b.blw", options);
+  EXPECT_LE(byBudget.fileBytes, byPsnr.fileBytes);
+  EXPECT_LT(squaredError(byBudget), 0.9 * squaredError(byPsnr));
+}
+
+// Bricks of very different ranges, all of noise.
+ImportedGrid varied() {
+  ImportedGrid grid = halfStill(0, 0.5f);
+  for (std::size_t b = 1; b < grid.leaves.size(); ++b) {
+    const float loudness = std::exp2(-static_cast<float>(b * 61 % 216) / 40);
+    for (float& value : grid.leaves[b].values) value = (value == 2 ? 1 : value) * loudness;
+  }
+  return grid;
+}
+
+// On what the disk's budget alone would take, the GPU's is a little short, and the other way round.
+TEST_F(BudgetTest, WhereBothBudgetsBindBothAreUsed) {
+  addFrame(varied());
+  CompileOptions disk, gpu, both;
+  disk.budget.disk = 30000;
+  const CompileReport byDisk = compileTo("a.blw", disk);
+  gpu.budget.gpu = both.budget.gpu = byDisk.gpuBytes * 94 / 100;
+  both.budget.disk = disk.budget.disk;
+  const CompileReport byGpu = compileTo("b.blw", gpu);
+  ASSERT_GT(byGpu.fileBytes, *disk.budget.disk);
+  const CompileReport byBoth = compileTo("c.blw", both);
+  EXPECT_LE(byBoth.gpuBytes, *both.budget.gpu);
+  EXPECT_GE(byBoth.gpuBytes, *both.budget.gpu * 97 / 100);
+  EXPECT_LE(byBoth.fileBytes, *both.budget.disk);
+  EXPECT_GE(byBoth.fileBytes, *both.budget.disk * 97 / 100);
+  EXPECT_LE(squaredError(byBoth), 1.15 * std::max(squaredError(byDisk), squaredError(byGpu)));
+}
+
+TEST_F(BudgetTest, ABudgetThatTheOtherOneImpliesChangesNothing) {
+  addHalfStill(3);
+  CompileOptions options;
+  options.budget.gpu = 120000;
+  const CompileReport alone = compileTo("a.blw", options);
+  options.budget.disk = 1 << 20;
+  const CompileReport both = compileTo("b.blw", options);
+  EXPECT_EQ(alone.gpuBytes, both.gpuBytes);
+  EXPECT_EQ(squaredError(alone), squaredError(both));
+}
+
+TEST_F(BudgetTest, BudgetsAreKeptByTheMetricOfDepth) {
+  addHalfStill(3);
+  CompileOptions options;
+  options.quality.metric = Metric::depth;
+  options.budget.gpu = 120000;
+  const CompileReport byGpu = compileTo("a.blw", options);
+  EXPECT_LE(byGpu.gpuBytes, 120000u);
+  EXPECT_GE(byGpu.gpuBytes, 116000u);
+  options.budget = {std::nullopt, 90000};
+  const CompileReport byDisk = compileTo("b.blw", options);
+  EXPECT_LE(byDisk.fileBytes, 90000u);
+  EXPECT_GE(byDisk.fileBytes, 87000u);
 }
 
 TEST_F(BudgetTest, BothBudgetsAndTheLargestErrorHoldTogether) {

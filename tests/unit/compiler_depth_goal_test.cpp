@@ -7,6 +7,7 @@
 #include <random>
 
 #include "choose/choose.h"
+#include "choose/decide.h"
 #include "choose/depth_goal.h"
 #include "metric/depth_distortion.h"
 #include "metric/depth_error.h"
@@ -90,6 +91,35 @@ TEST(DepthGoal, NoVoxelIsOffByMoreThanATwentiethOfTheRange) {
 TEST(DepthGoal, CostsLessThanTheSamePsnrOfVoxels) {
   const ImportedGrid grid = cloud();
   EXPECT_LT(bytesOf(choose(grid, 50, Metric::depth)), bytesOf(choose(grid, 50, Metric::voxel)));
+}
+
+// The grid with the least error by the metric that has at most so many bytes of payload.
+ChosenGrid within(const ImportedGrid& grid, std::size_t bytes, Metric metric) {
+  Quality quality;
+  quality.psnr.reset();
+  quality.metric = metric;
+  ChosenGrid best;
+  double low = -60, high = 20;  // octaves of the multiplier
+  for (int round = 0; round < 12; ++round) {
+    const double middle = (low + high) / 2;
+    const Goal goal = goalAt({std::exp2(middle), {1, 0}}, quality);
+    GridTrials trials(grid, goal, quality.effort, {});
+    ChosenGrid chosen = decide(grid, goal, trials, {}, {}, "grid");
+    const bool fits = bytesOf(chosen) <= bytes;
+    (fits ? high : low) = middle;
+    if (fits) best = std::move(chosen);
+  }
+  return best;
+}
+
+TEST(DepthGoal, BytesSpentByItServeDepthBetterThanBytesSpentByVoxels) {
+  const ImportedGrid grid = cloud();
+  for (const std::size_t bytes : {std::size_t{12000}, std::size_t{20000}}) {
+    const double byVoxel = measureDepth(grid, decoded(grid, within(grid, bytes, Metric::voxel))).psnr();
+    const double byDepth = measureDepth(grid, decoded(grid, within(grid, bytes, Metric::depth))).psnr();
+    EXPECT_GE(byDepth, byVoxel);
+    EXPECT_GT(byVoxel, 30);
+  }
 }
 
 TEST(DepthGoal, ReportsTheErrorOfVoxels) {

@@ -25,7 +25,7 @@ enum class Metric {
 // What the user asks of every grid in every frame. All that are given hold.
 struct Quality {
   std::optional<double> psnr = 47.0;  // dB, by the metric
-  Metric metric = Metric::voxel;      // depth needs a psnr
+  Metric metric = Metric::voxel;      // depth needs a psnr or a budget
   std::optional<float> maxError;      // largest |reconstructed - source|, in the grid's own unit
   int effort = 1;                     // of the BC7 encoder, 0 to 9
 };
@@ -36,9 +36,9 @@ struct RateWeights {
   double disk = 0;
 };
 
-// A fixed exchange rate instead of a PSNR: bricks are chosen where squaredError + multiplier * rate is least.
+// A fixed exchange rate instead of a PSNR: bricks are chosen where distortion + multiplier * rate is least.
 struct Exchange {
-  double multiplier = 0;  // squared error, in the grid's own unit, that a byte is worth; > 0
+  double multiplier = 0;  // distortion by the metric, in the grid's own unit, that a byte is worth; > 0
   RateWeights weights;
 };
 

@@ -56,8 +56,9 @@ class Decision {
   Fit measure(std::size_t i, const ChosenBrick& stored, Choice& choice) const {
     Fit fit{stored.encoding, stored.texelMask, stored.lo, stored.scale, stored.squaredError, stored.maxError};
     format::Values errors;
-    if (unchanged_[i] == 0 || goal_.depth) fit = measureReuse(stored, grid_.leaves[i], grid_.background, errors);
-    const double distortion = goal_.depth ? depthDistortion(errors) : fit.squaredError;
+    const bool depth = goal_.metric == Metric::depth;
+    if (unchanged_[i] == 0 || depth) fit = measureReuse(stored, grid_.leaves[i], grid_.background, errors);
+    const double distortion = depth ? depthDistortion(errors) : fit.squaredError;
     choice = {goal_.exchange ? 0 : sizeOf(i, stored) / kReuseDivisor, distortion, fit.maxError};
     return fit;
   }

@@ -1,7 +1,7 @@
 #include "choose/depth_goal.h"
 
-#include "billow/format/brick.h"
 #include "choose/decibels.h"
+#include "choose/decode_stored.h"
 #include "metric/depth_distortion.h"
 #include "metric/depth_error.h"
 #include "parallel.h"
@@ -14,19 +14,6 @@ constexpr double kVoxelLimit = 0.05;
 
 // Asked for beyond the shortfall (0.02 dB), so that the next measure is likely the last.
 constexpr double kStep = 0.9977;
-
-// `brick` is a ChosenBrick or a Candidate, with a payload of its encoding's size at least.
-template <class Brick>
-void decode(const Brick& brick, const format::Mask3& active, float background, format::Values& values) {
-  format::Node3 node{};
-  node.brick = brick.encoding << format::kEncodingShift;
-  node.mask = brick.texelMask ? format::kMaskTexel : 0;
-  node.lo = brick.lo;
-  node.scale = brick.scale;
-  format::Mask3 decoded;
-  const std::span<const std::byte> payload(brick.payload.data(), *format::brickBytes(brick.encoding));
-  format::decodeBrick(node, &active, payload, background, values, decoded);
-}
 
 }  // namespace
 
@@ -48,7 +35,7 @@ bool DepthGoal::holds(std::span<const ChosenBrick> bricks) {
   ImportedGrid result = grid_;
   parallelRanges(bricks.size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
-      decode(bricks[i], grid_.leaves[i].active, grid_.background, result.leaves[i].values);
+      decodeStored(bricks[i], grid_.leaves[i].active, grid_.background, result.leaves[i].values);
     }
   });
   const double reached = measureDepth(grid_, result).rmse();
@@ -59,7 +46,7 @@ bool DepthGoal::holds(std::span<const ChosenBrick> bricks) {
 
 double DepthGoal::distortion(const BrickSource& brick, const Candidate& candidate) {
   format::Values error;
-  decode(candidate, *brick.active, brick.tile, error);
+  decodeStored(candidate, *brick.active, brick.tile, error);
   for (std::uint32_t v = 0; v < format::kBrickVoxels; ++v) {
     error[v] = format::maskBit(*brick.active, v) ? error[v] - (*brick.values)[v] : 0;
   }

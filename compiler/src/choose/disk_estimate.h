@@ -3,20 +3,16 @@
 #define BILLOW_COMPILER_CHOOSE_DISK_ESTIMATE_H
 
 #include <cstdint>
-#include <span>
 
 #include "stages.h"
 
 namespace billow::compiler {
 
-// log2(value) in 1/256 bit, rounded down; value > 0. Integer arithmetic: the same everywhere.
-std::uint32_t log2In256ths(std::uint32_t value);
-
-// Order-0 entropy of symbols with these counts, in bytes, rounded up.
-std::uint32_t entropyBytes(std::span<const std::uint32_t> counts);
-
-// Estimated bytes of a candidate in a compressed page: its payload, its mask where one is stored, and its node.
-std::uint32_t estimateDiskBytes(const Candidate& candidate, const format::Mask3& active, bool storesMask);
+// Estimated bytes of a candidate in a compressed page: its payload, its node, and its mask where `hasMask`: some voxel
+// is inactive, and the mask is stored or coded with the indices. Not of local bricks, which no disk budget takes.
+std::uint32_t estimateDiskBytes(const Candidate& candidate, const format::Mask3& active, bool hasMask);
+// The same of a uniform brick, from the length of its indices in 1/256 bit.
+std::uint32_t diskBytesOfIndices(std::uint32_t bits256, bool hasMask);
 
 }  // namespace billow::compiler
 

@@ -25,8 +25,13 @@ double Goal::errorBudget(std::uint64_t voxels, std::uint64_t all) const {
   return *rmse * *rmse * static_cast<double>(voxels) * (1 - 1e-6);
 }
 
+double Goal::bitWorth() const {
+  return exchange ? exchange->multiplier * exchange->weights.disk / 8 / distortionOfNoise() : 0;
+}
+
 Goal goalOf(const ImportedGrid& grid, const Quality& quality) {
   Goal goal;
+  goal.metric = quality.metric;
   if (quality.maxError) goal.limit = goal.hardLimit = *quality.maxError;
   if (quality.metric == Metric::depth) {
     goal.depth = std::make_shared<DepthGoal>(grid, *quality.psnr);
@@ -42,11 +47,13 @@ Goal goalOf(const ImportedGrid& grid, const Quality& quality) {
 Goal goalAt(const Exchange& exchange, const Quality& quality) {
   Goal goal;
   goal.exchange = exchange;
+  goal.metric = quality.metric;
   goal.countsDisk = exchange.weights.disk > 0;
   goal.gpuAlone = !goal.countsDisk;
   if (quality.maxError) goal.hardLimit = *quality.maxError;
-  const double rmse =
-      std::sqrt(exchange.multiplier * (exchange.weights.gpu + exchange.weights.disk) / kErrorsPerMultiplier);
+  const double squaredErrorPerByte =
+      exchange.multiplier * (exchange.weights.gpu + exchange.weights.disk) / goal.distortionOfNoise();
+  const double rmse = std::sqrt(squaredErrorPerByte / kErrorsPerMultiplier);
   goal.limit = std::min(goal.hardLimit, static_cast<float>(kOutlierLimit * rmse));
   return goal;
 }

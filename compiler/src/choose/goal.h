@@ -19,10 +19,15 @@ struct Goal {
   std::optional<Exchange> exchange;  // in place of rmse
   float hardLimit = std::numeric_limits<float>::infinity();  // largest error of a voxel that the user allows
   float limit = std::numeric_limits<float>::infinity();      // the same or less: no voxel goes far astray
+  Metric metric = Metric::voxel;                             // what choices' distortions are of
   bool countsDisk = false;                                   // bytes on disk are estimated, which takes time
   bool gpuAlone = false;                                     // the GPU's bytes are all that counts
 
   bool hasBudget() const { return rmse || depth; }
+  // Distortion a squared error of voxels, where errors are uncorrelated.
+  double distortionOfNoise() const { return metric == Metric::depth ? DepthGoal::kDistortionOfNoise : 1; }
+  // Squared error of voxels that a bit on disk is worth; 0 where no exchange says.
+  double bitWorth() const;
   // Squared error (with depth: distortion) that `voxels` of the grid's `all` in leaves may have together; infinite
   // without rmse and depth.
   double errorBudget(std::uint64_t voxels, std::uint64_t all) const;

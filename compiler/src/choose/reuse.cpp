@@ -4,12 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
+
+#include "choose/decode_stored.h"
+#include "encode/error_sums.h"
 
 namespace billow::compiler {
 namespace {
 
-static_assert(sizeof(Leaf) == 12 + sizeof(format::Mask3) + sizeof(format::Values), "Leaf has no padding");
+static_assert(offsetof(Leaf, values) == offsetof(Leaf, active) + sizeof(format::Mask3), "Leaf has no padding");
 
 bool sameMask(const format::Mask3& a, const format::Mask3& b) {
   return std::memcmp(&a, &b, sizeof(a)) == 0;
@@ -27,12 +31,18 @@ void matchPlaces(const Before& before, const Now& now, const Match& match) {
 
 }  // namespace
 
+Hash128 hashOf(std::span<const std::byte> bytes) {
+  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
+  return {hash.low64, hash.high64};
+}
+
 std::vector<LeafKey> leafKeys(const ImportedGrid& grid) {
+  constexpr std::size_t kContent = sizeof(Leaf::active) + sizeof(Leaf::values);
   std::vector<LeafKey> keys;
   keys.reserve(grid.leaves.size());
   for (const Leaf& leaf : grid.leaves) {
-    const std::uint64_t mask = XXH3_64bits(&leaf.active, sizeof(leaf.active));
-    keys.push_back({leaf.origin, XXH3_64bits_withSeed(leaf.values.data(), sizeof(leaf.values), mask)});
+    const auto* content = reinterpret_cast<const std::byte*>(&leaf.active);
+    keys.push_back({leaf.origin, hashOf({content, kContent})});
   }
   return keys;
 }
@@ -61,19 +71,18 @@ std::vector<const ChosenBrick*> FrameBefore::candidates(const ImportedGrid& grid
 }
 
 Fit measureReuse(const ChosenBrick& stored, const Leaf& leaf, float background, format::Values& errors) {
-  format::Node3 node{};
-  node.brick = stored.encoding << format::kEncodingShift;
-  node.mask = stored.texelMask ? format::kMaskTexel : 0;
-  node.lo = stored.lo;
-  node.scale = stored.scale;
-  format::Mask3 active;
-  format::decodeBrick(node, &leaf.active, stored.payload, background, errors, active);
+  decodeStored(stored, leaf.active, background, errors);
   Fit fit{stored.encoding, stored.texelMask, stored.lo, stored.scale, 0, 0};
+  double largest = 0;
   for (std::uint32_t v = 0; v < format::kBrickVoxels; ++v) {
-    errors[v] = format::maskBit(active, v) ? errors[v] - leaf.values[v] : 0;
-    fit.squaredError += static_cast<double>(errors[v]) * static_cast<double>(errors[v]);
-    fit.maxError = std::max(fit.maxError, std::fabs(errors[v]));
+    // In double: the difference of any two floats is finite there.
+    const double error =
+        format::maskBit(leaf.active, v) ? static_cast<double>(errors[v]) - static_cast<double>(leaf.values[v]) : 0;
+    fit.squaredError += error * error;
+    largest = std::max(largest, std::fabs(error));
+    errors[v] = static_cast<float>(error);
   }
+  fit.maxError = roundUp(largest);
   return fit;
 }
 

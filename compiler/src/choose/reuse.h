@@ -3,6 +3,7 @@
 #define BILLOW_COMPILER_CHOOSE_REUSE_H
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -11,10 +12,14 @@
 
 namespace billow::compiler {
 
+// XXH3-128: equal ones are taken for equal content.
+using Hash128 = std::array<std::uint64_t, 2>;
+Hash128 hashOf(std::span<const std::byte> bytes);
+
 // A leaf's place and content: what the next frame is compared with before anything is tried.
 struct LeafKey {
   std::array<std::int32_t, 3> origin;
-  std::uint64_t hash;  // XXH3-64 of mask and values
+  Hash128 hash;  // of mask and values
 };
 
 // In the order of the grid's leaves.

@@ -15,7 +15,7 @@ constexpr int kStepsPerOctave = 4;
 constexpr std::array<double, 5> kOctave = {1, 1.189207115002721, 1.4142135623730951, 1.681792830507429, 2};
 
 // Below the first step 16 bits a voxel pay even in bricks that span a thousandth of the grid's range; above the last
-// nothing but a constant pays. Both from the square of the range.
+// nothing but a constant pays. Both from the square of the range, or from the distortion that noise of it would have.
 constexpr int kFirstOctave = -46;
 constexpr int kLastOctave = 6;
 
@@ -75,32 +75,36 @@ double positionOf(double multiplier) {
   return (exponent - 1) * kStepsPerOctave + static_cast<double>(step) + fraction;
 }
 
-SizeCurve::SizeCurve(const ImportedGrid& grid, const GridTrials* trials, std::span<const char> skip,
-                     const Quality& quality, const RateWeights& weights, const std::string& where) {
+SizeCurves::SizeCurves(const ImportedGrid& grid, const GridTrials* trials, std::span<const char> skip,
+                       const Quality& quality, std::span<const RateWeights> mixes, const std::string& where) {
   if (grid.leaves.empty() && grid.tiles.empty()) {
-    steps_.emplace_back();
+    steps_.assign(mixes.size(), std::vector<PackBytes>(1));
     return;
   }
   const double range = static_cast<double>(grid.max) - static_cast<double>(grid.min);
-  const int top = static_cast<int>(std::floor(positionOf(range > 0 ? range * range : 1)));
+  const double noise = quality.metric == Metric::depth ? DepthGoal::kDistortionOfNoise : 1;
+  const int top = static_cast<int>(std::floor(positionOf(range > 0 ? range * range * noise : 1)));
   first_ = top + kFirstOctave * kStepsPerOctave;
-  steps_.resize((kLastOctave - kFirstOctave) * kStepsPerOctave + 1);
+  constexpr std::size_t kSteps = (kLastOctave - kFirstOctave) * kStepsPerOctave + 1;
+  steps_.assign(mixes.size(), std::vector<PackBytes>(kSteps));
   const format::GridFrame frame = shape(grid, where);
   const auto known = static_cast<std::uint64_t>(std::count(skip.begin(), skip.end(), '\1'));
-  parallelRanges(steps_.size(), 8, [&](std::size_t begin, std::size_t end) {
+  parallelRanges(kSteps * mixes.size(), 8, [&](std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s != end; ++s) {
-      const Exchange exchange{ladderMultiplier(first_ + static_cast<int>(s)), weights};
-      steps_[s] = sizeAt(trials, goalAt(exchange, quality), frame);
-      steps_[s].gpu -= static_cast<double>(known * format::kGpuRecordBytes);
+      const Exchange exchange{ladderMultiplier(first_ + static_cast<int>(s % kSteps)), mixes[s / kSteps]};
+      PackBytes& bytes = steps_[s / kSteps][s % kSteps];
+      bytes = sizeAt(trials, goalAt(exchange, quality), frame);
+      bytes.gpu -= static_cast<double>(known * format::kGpuRecordBytes);
     }
   });
 }
 
-PackBytes SizeCurve::at(double multiplier) const {
-  const double place = std::clamp(positionOf(multiplier) - first_, 0.0, static_cast<double>(steps_.size() - 1));
+PackBytes SizeCurves::at(double multiplier, std::size_t mix) const {
+  const std::vector<PackBytes>& steps = steps_[mix];
+  const double place = std::clamp(positionOf(multiplier) - first_, 0.0, static_cast<double>(steps.size() - 1));
   const auto step = static_cast<std::size_t>(place);
-  const PackBytes& from = steps_[step];
-  const PackBytes& to = steps_[std::min(step + 1, steps_.size() - 1)];
+  const PackBytes& from = steps[step];
+  const PackBytes& to = steps[std::min(step + 1, steps.size() - 1)];
   const double fraction = place - static_cast<double>(step);
   return {from.gpu + fraction * (to.gpu - from.gpu), from.disk + fraction * (to.disk - from.disk)};
 }

@@ -24,19 +24,20 @@ struct PackBytes {
   double disk = 0;
 };
 
-class SizeCurve {
+// Curves for several weights of the two kinds of bytes.
+class SizeCurves {
  public:
-  // Of the leaves that were tried; skipped ones cost nothing. trials: null where there is no leaf. weights: of the rate
-  // that will be traded.
-  SizeCurve(const ImportedGrid& grid, const GridTrials* trials, std::span<const char> skip, const Quality& quality,
-            const RateWeights& weights, const std::string& where);
+  // Of the leaves that were tried; skipped ones cost nothing. trials: null where there is no leaf. mixes: the weights
+  // of the rate that will be traded, one curve each.
+  SizeCurves(const ImportedGrid& grid, const GridTrials* trials, std::span<const char> skip, const Quality& quality,
+             std::span<const RateWeights> mixes, const std::string& where);
 
-  // At a multiplier in the grid's own unit; the ends go on level.
-  PackBytes at(double multiplier) const;
+  // At a multiplier in the grid's own unit, by the curve of a mix; the ends go on level.
+  PackBytes at(double multiplier, std::size_t mix) const;
 
  private:
-  int first_ = 0;  // position of the first step
-  std::vector<PackBytes> steps_;
+  int first_ = 0;                              // position of the first step
+  std::vector<std::vector<PackBytes>> steps_;  // by mix
 };
 
 }  // namespace billow::compiler

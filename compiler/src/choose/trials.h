@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <utility>
@@ -12,6 +13,7 @@
 
 #include "choose/choose.h"
 #include "choose/goal.h"
+#include "parallel.h"
 
 namespace billow::compiler {
 
@@ -42,9 +44,10 @@ class GridTrials {
 
  private:
   struct Brick {
-    std::vector<Fit> tried;               // beside the brick's choices
-    std::vector<std::byte> bc7;           // payloads of those that are BC7, in their order
-    const ChosenBrick* stored = nullptr;  // what was offered, as choice storedAt
+    std::vector<Fit> tried;                // beside the brick's choices
+    std::vector<std::uint32_t> lastIndex;  // beside them: DiskUniform::last of those made for the disk, else 0
+    std::vector<std::byte> bc7;            // payloads of those that are BC7, in their order
+    const ChosenBrick* stored = nullptr;   // what was offered, as choice storedAt
     std::uint32_t storedAt = format::kNone;
   };
   // Squared error that a unit of rate saves at the margin, and the largest error that counts.
@@ -58,6 +61,8 @@ class GridTrials {
   void tryConstants();
   void settleQuietBricks();
   void tryUniform();
+  void tryForDisk(std::size_t brick, Candidate& candidate);
+  std::vector<std::uint32_t> lastsWorthTrying(std::size_t brick) const;
   void tryLocal();
   void tryCoarse();
   void tryBc7();
@@ -72,10 +77,18 @@ class GridTrials {
   BrickSource source(std::size_t brick) const;
   std::uint32_t maskBytes(std::size_t brick) const;
   std::vector<std::byte> payloadOf(std::size_t brick, std::uint32_t choice) const;
+  double distortionOf(std::size_t brick, const Candidate& candidate) const;
   void add(std::size_t brick, const Candidate& candidate);
   void add(std::size_t brick, const Fit& fit, double distortion, std::uint32_t diskBytes);
   template <class Function>
-  void forEachTried(const Function& function);
+  void forEachTried(const Function& function) {
+    parallelRanges(bricks_.size(), 16, [&](std::size_t begin, std::size_t end) {
+      const auto candidate = std::make_unique<Candidate>();
+      for (std::size_t i = begin; i != end; ++i) {
+        if (!skip_[i]) function(i, *candidate);
+      }
+    });
+  }
 
   const ImportedGrid& grid_;
   const Goal goal_;

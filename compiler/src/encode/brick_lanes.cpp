@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "encode/error_sums.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "encode/brick_lanes.cpp"
 #include <hwy/foreach_target.h>
@@ -96,7 +98,7 @@ void measure(const BrickSource& brick, const format::Texels& texels, Candidate& 
   }
   // In double: the difference of any two floats is finite there. Eight sums whatever the vectors' width, so that every
   // machine adds in the same order.
-  constexpr std::uint32_t kSums = 8;
+  constexpr std::uint32_t kSums = ErrorSums::kParts;
   constexpr std::uint32_t kParts = kSums / kDoubleLanes;
   hn::Vec<DoubleLanes> squaredParts[kParts], largestParts[kParts];
   for (std::uint32_t part = 0; part < kParts; ++part) {
@@ -110,19 +112,12 @@ void measure(const BrickSource& brick, const format::Texels& texels, Candidate& 
       largestParts[part] = hn::Max(largestParts[part], hn::Abs(error));
     }
   }
-  double squared[kSums], largest[kSums];
+  ErrorSums sums;
   for (std::uint32_t part = 0; part < kParts; ++part) {
-    hn::StoreU(squaredParts[part], DoubleLanes(), squared + part * kDoubleLanes);
-    hn::StoreU(largestParts[part], DoubleLanes(), largest + part * kDoubleLanes);
+    hn::StoreU(squaredParts[part], DoubleLanes(), sums.squared + part * kDoubleLanes);
+    hn::StoreU(largestParts[part], DoubleLanes(), sums.largest + part * kDoubleLanes);
   }
-  candidate.squaredError = 0;
-  double most = 0;
-  for (std::uint32_t j = 0; j < kSums; ++j) {
-    candidate.squaredError += squared[j];
-    most = largest[j] > most ? largest[j] : most;
-  }
-  constexpr double kLargest = std::numeric_limits<float>::max();
-  candidate.maxError = static_cast<float>(most < kLargest ? most : kLargest);
+  sums.setErrors(candidate);
 }
 
 void copyBlocks(const float* from, std::uint32_t packedAxis, float (*to)[16][8]) {

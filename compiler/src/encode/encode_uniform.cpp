@@ -1,17 +1,16 @@
 // Bricks that store an index a voxel, all on one scale: of 1 to 8 bits, or of 16.
+#include <bit>
 #include <cmath>
 #include <limits>
 
 #include "encode/brick_lanes.h"
+#include "encode/uniform_fit.h"
 #include "encode/uniform_lanes.h"
 
 namespace billow::compiler {
 namespace {
 
 constexpr int kRounds = 4;
-
-// What shortening lo and scale may add to the squared error, as a part of it.
-constexpr double kRoundingShare = 64;
 
 // The levels 0 to `last` with the least squared error that alternating between nearest levels and least squares finds,
 // from levels in the middle of equal parts on.
@@ -42,10 +41,6 @@ std::uint32_t firstIndex(const BrickSource& brick) {
   return brick.activeCount < format::kBrickVoxels ? 1 : 0;
 }
 
-bool isFinite(const TexelRange& range, std::uint32_t last) {
-  return std::isfinite(range.lo) && std::isfinite(format::reconstruct(range.lo, range.scale, last));
-}
-
 // lo and scale for indices [first, last]: fitted where that is possible in single precision.
 TexelRange fitRange(const ActiveValues& active, std::uint32_t first, std::uint32_t last) {
   if (active.count == 0) return {};
@@ -61,30 +56,40 @@ TexelRange fitRange(const ActiveValues& active, std::uint32_t first, std::uint32
   const double lo = low + static_cast<double>(levels.first) * width - step * first;
   const double tolerance = std::sqrt(error / active.count / kRoundingShare) * width;
   const TexelRange fitted = shorten(lo, step, last, tolerance);
-  return isFinite(fitted, last) ? fitted : covering;
+  return isStorable(fitted, last) ? fitted : covering;
 }
 
-void fitUniform(const BrickSource& brick, const ActiveValues& active, std::uint32_t bits, float* indices, Fit& fit) {
-  const std::uint32_t last = (1u << bits) - 1;
+constexpr std::uint32_t lastOf(std::uint32_t bits) {
+  return (1u << bits) - 1;
+}
+
+}  // namespace
+
+bool isStorable(const TexelRange& range, std::uint32_t last) {
+  return std::isfinite(range.lo) && std::isfinite(format::reconstruct(range.lo, range.scale, last));
+}
+
+std::uint32_t fitUniform(const BrickSource& brick, const ActiveValues& active, std::uint32_t last, float* indices,
+                         Fit& fit) {
   std::uint32_t first = firstIndex(brick);
   TexelRange range = fitRange(active, first, last);
   if (!(range.lo >= std::numeric_limits<float>::lowest())) {
     first = 0;
     range = fitRange(active, first, last);
   }
-  fit.encoding = format::uniformEncoding(bits);
+  fit.encoding = format::uniformEncoding(static_cast<std::uint32_t>(std::bit_width(last)));
   fit.texelMask = first != 0;
   fit.lo = range.lo;
   fit.scale = range.scale;
   quantise(active, first, last, indices, fit);
+  return first;
 }
-
-}  // namespace
 
 void fitUniforms(const BrickSource& brick, std::uint32_t first, std::uint32_t last, std::array<Fit, 8>& fits) {
   const ActiveValues active(brick);
   alignas(32) float indices[format::kBrickVoxels];
-  for (std::uint32_t bits = first; bits <= last; ++bits) fitUniform(brick, active, bits, indices, fits[bits - 1]);
+  for (std::uint32_t bits = first; bits <= last; ++bits)
+    fitUniform(brick, active, lastOf(bits), indices, fits[bits - 1]);
 }
 
 std::array<double, 8> estimateUniforms(const BrickSource& brick) {
@@ -101,7 +106,7 @@ std::array<double, 8> estimateUniforms(const BrickSource& brick) {
 void encodeUniform(const BrickSource& brick, std::uint32_t bits, Candidate& out) {
   const ActiveValues active(brick);
   alignas(32) float indices[format::kBrickVoxels];
-  fitUniform(brick, active, bits, indices, out);
+  fitUniform(brick, active, lastOf(bits), indices, out);
   format::Texels texels;
   spread(brick, indices, texels);
   format::packIndices(texels, bits, out.payload.data());

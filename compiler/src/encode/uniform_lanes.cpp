@@ -1,6 +1,6 @@
 #include "encode/uniform_lanes.h"
 
-#include <limits>
+#include "encode/error_sums.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "encode/uniform_lanes.cpp"
@@ -58,6 +58,30 @@ LevelSums sumNearest(const ActiveValues& active, const Levels& levels) {
   return {level.total(), levelSquared.total(), product.total(), place.total(), error.total()};
 }
 
+void measureIndices(const ActiveValues& active, const float* indices, Fit& fit) {
+  const std::uint32_t count = active.count;
+  // format::reconstruct, repeated here so that it can be vectorised; the tests hold the two together.
+  alignas(32) float decoded[format::kBrickVoxels];
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const float product = fit.scale * indices[i];
+    decoded[i] = fit.lo + product;
+  }
+  ErrorSums sums;
+  static_assert(ErrorSums::kParts == kBlockLanes);
+  const auto add = [&](std::uint32_t i, std::uint32_t lane) {
+    const double error = static_cast<double>(decoded[i]) - static_cast<double>(active.value[i]);
+    const double magnitude = error < 0 ? -error : error;
+    sums.squared[lane] += error * error;
+    sums.largest[lane] = sums.largest[lane] > magnitude ? sums.largest[lane] : magnitude;
+  };
+  std::uint32_t i = 0;
+  for (; i + kBlockLanes <= count; i += kBlockLanes) {
+    for (std::uint32_t lane = 0; lane < kBlockLanes; ++lane) add(i + lane, lane);
+  }
+  for (std::uint32_t lane = 0; i + lane < count; ++lane) add(i + lane, lane);
+  sums.setErrors(fit);
+}
+
 void quantise(const ActiveValues& active, std::uint32_t first, std::uint32_t last, float* indices, Fit& fit) {
   const double inverse = fit.scale > 0 ? 1 / static_cast<double>(fit.scale) : 0;
   const auto lo = static_cast<double>(fit.lo);
@@ -68,32 +92,7 @@ void quantise(const ActiveValues& active, std::uint32_t first, std::uint32_t las
     const double above = raw > low ? raw : low;
     indices[i] = static_cast<float>(static_cast<std::int32_t>((above < high ? above : high) + 0.5));
   }
-  // format::reconstruct, repeated here so that it can be vectorised; the tests hold the two together.
-  alignas(32) float decoded[format::kBrickVoxels];
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const float product = fit.scale * indices[i];
-    decoded[i] = fit.lo + product;
-  }
-  double squared[kBlockLanes] = {}, largest[kBlockLanes] = {};
-  const auto add = [&](std::uint32_t i, std::uint32_t lane) {
-    const double error = static_cast<double>(decoded[i]) - static_cast<double>(active.value[i]);
-    const double magnitude = error < 0 ? -error : error;
-    squared[lane] += error * error;
-    largest[lane] = largest[lane] > magnitude ? largest[lane] : magnitude;
-  };
-  std::uint32_t i = 0;
-  for (; i + kBlockLanes <= count; i += kBlockLanes) {
-    for (std::uint32_t lane = 0; lane < kBlockLanes; ++lane) add(i + lane, lane);
-  }
-  for (std::uint32_t lane = 0; i + lane < count; ++lane) add(i + lane, lane);
-  fit.squaredError = 0;
-  double most = 0;
-  for (std::uint32_t lane = 0; lane < kBlockLanes; ++lane) {
-    fit.squaredError += squared[lane];
-    most = largest[lane] > most ? largest[lane] : most;
-  }
-  constexpr double kLargest = std::numeric_limits<float>::max();
-  fit.maxError = static_cast<float>(most < kLargest ? most : kLargest);
+  HWY_NAMESPACE::measureIndices(active, indices, fit);
 }
 
 }  // namespace
@@ -105,6 +104,7 @@ namespace billow::compiler {
 
 HWY_EXPORT(sumNearest);
 HWY_EXPORT(quantise);
+HWY_EXPORT(measureIndices);
 
 LevelSums sumNearest(const ActiveValues& active, const Levels& levels) {
   return HWY_DYNAMIC_DISPATCH(sumNearest)(active, levels);
@@ -112,6 +112,10 @@ LevelSums sumNearest(const ActiveValues& active, const Levels& levels) {
 
 void quantise(const ActiveValues& active, std::uint32_t first, std::uint32_t last, float* indices, Fit& fit) {
   HWY_DYNAMIC_DISPATCH(quantise)(active, first, last, indices, fit);
+}
+
+void measureIndices(const ActiveValues& active, const float* indices, Fit& fit) {
+  HWY_DYNAMIC_DISPATCH(measureIndices)(active, indices, fit);
 }
 
 }  // namespace billow::compiler

@@ -20,6 +20,8 @@ LevelSums sumNearest(const ActiveValues& active, const Levels& levels);
 // The indices in [first, last] nearest to the values on fit.lo and fit.scale, and the fit's errors with them, by the
 // arithmetic of format::reconstruct.
 void quantise(const ActiveValues& active, std::uint32_t first, std::uint32_t last, float* indices, Fit& fit);
+// The fit's errors with these indices.
+void measureIndices(const ActiveValues& active, const float* indices, Fit& fit);
 
 }  // namespace billow::compiler
 

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 #include <tbb/parallel_pipeline.h>
-#include <xxhash.h>
 
-#include <unordered_set>
+#include <set>
+#include <span>
 
 namespace billow::compiler {
 namespace {
@@ -16,13 +16,23 @@ static_assert(sizeof(Tile) == 20, "Tile has no padding that a hash would meet");
 
 using FramePtr = std::shared_ptr<FrameWork>;
 
-std::uint64_t contentOf(const ImportedGrid& grid, const std::vector<LeafKey>& keys) {
-  std::uint64_t hash = XXH3_64bits_withSeed(&grid.background, sizeof(grid.background), keys.size());
+Hash128 contentOf(const ImportedGrid& grid, const std::vector<LeafKey>& keys) {
+  static_assert(sizeof(LeafKey) == 32);  // 4 of padding, left out here
+  std::vector<std::byte> bytes;
+  bytes.reserve(16 + keys.size() * 28 + grid.tiles.size() * sizeof(Tile));
+  const auto add = [&](const auto* items, std::size_t count) {
+    const std::span<const std::byte> more = std::as_bytes(std::span(items, count));
+    bytes.insert(bytes.end(), more.begin(), more.end());
+  };
+  const std::uint64_t leaves = keys.size();
+  add(&leaves, 1);
+  add(&grid.background, 1);
   for (const LeafKey& key : keys) {
-    hash = XXH3_64bits_withSeed(key.origin.data(), sizeof(key.origin), hash);
-    hash = XXH3_64bits_withSeed(&key.hash, sizeof(key.hash), hash);
+    add(key.origin.data(), key.origin.size());
+    add(key.hash.data(), key.hash.size());
   }
-  return XXH3_64bits_withSeed(grid.tiles.data(), grid.tiles.size() * sizeof(Tile), hash);
+  add(grid.tiles.data(), grid.tiles.size());
+  return hashOf(bytes);
 }
 
 class Pipeline {
@@ -92,8 +102,8 @@ class Pipeline {
 
   const FrameRun& run_;
   std::vector<Job> jobs_;
-  std::unordered_set<std::uint64_t> contents_;  // of every grid frame so far
-  std::vector<std::vector<LeafKey>> before_;    // by grid of the volume: the last new content
+  std::set<Hash128> contents_;                // of every grid frame so far
+  std::vector<std::vector<LeafKey>> before_;  // by grid of the volume: the last new content
 };
 
 }  // namespace

@@ -23,8 +23,8 @@ struct Job {
 };
 
 struct GridWork {
-  std::uint64_t content = 0;  // hash of all that the grid's tree depends on: voxels, tiles, background, no transform
-  bool isNew = false;         // present, and no frame or grid before has this content
+  Hash128 content{};   // hash of all that the grid's tree depends on: voxels, tiles, background, no transform
+  bool isNew = false;  // present, and no frame or grid before has this content
   // The rest only where isNew.
   std::vector<LeafKey> keys;
   std::vector<char> unchanged;  // by leaf: the same as in the last frame in which this grid was new

@@ -2,6 +2,7 @@
 #ifndef BILLOW_COMPILER_PASSES_SURVEY_H
 #define BILLOW_COMPILER_PASSES_SURVEY_H
 
+#include <span>
 #include <vector>
 
 #include "choose/size_curve.h"
@@ -12,25 +13,27 @@ namespace billow::compiler {
 
 class Survey {
  public:
-  Survey(const CompileOptions& options, const Plan& plan, const RateWeights& weights, const Warn& warn);
+  // mixes: of the two kinds of bytes; not empty. `options` need not outlive this, `plan` must.
+  Survey(const CompileOptions& options, const Plan& plan, std::span<const RateWeights> mixes, const Warn& warn);
 
-  // Square of the range of a grid over the whole sequence, background included; 1 where it is constant. Squared errors
-  // divided by it are comparable between grids.
+  // Square of the range of a grid over the whole sequence, background included (by Metric::depth: of its line
+  // integrals); 1 where it is constant. Distortions divided by it are comparable between grids.
   double unit(std::size_t volume, std::size_t grid) const { return grids_[volume][grid].unit(); }
-  // Of the whole pack, at a multiplier of such comparable errors.
-  PackBytes at(double multiplier) const;
+  // Of the whole pack, at a multiplier of such comparable errors. `mix` may lie between two: straight lines.
+  PackBytes at(double multiplier, double mix) const;
 
  private:
   struct Grid {
-    float min = 0, max = 0;
+    double least = 0, most = 0;
     bool seen = false;
-    std::vector<SizeCurve> frames;
+    std::vector<SizeCurves> frames;
 
-    void grow(const ImportedGrid& imported);
+    void grow(const ImportedGrid& imported, Metric metric);
     double unit() const;
   };
 
-  void look(const FrameWork& frame, const Quality& quality, const RateWeights& weights);
+  void look(const FrameWork& frame, const Quality& quality, std::span<const RateWeights> mixes);
+  PackBytes atMix(double multiplier, std::size_t mix) const;
 
   const Plan& plan_;
   std::vector<std::vector<Grid>> grids_;  // by volume

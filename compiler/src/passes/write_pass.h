@@ -3,8 +3,8 @@
 #define BILLOW_COMPILER_PASSES_WRITE_PASS_H
 
 #include <cstdint>
+#include <map>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "billow/format/writer.h"
@@ -46,8 +46,8 @@ class WritePass {
   Sharer sharer_;
   format::PackTables tables_;
   std::uint32_t gridFrames_ = 0;
-  std::vector<FrameBefore> before_;  // by grid of the volume at hand: the last frame in which it was new
-  std::unordered_map<std::uint64_t, Written> written_;  // by content; some 1 KiB a grid and frame
+  std::vector<FrameBefore> before_;     // by grid of the volume at hand: the last frame in which it was new
+  std::map<Hash128, Written> written_;  // by content; some 1 KiB a grid and frame
   std::size_t done_ = 0;
   CompileReport report_;
 };
