@@ -16,6 +16,7 @@ inline format::EmitterRecord plainEmitter() {
   emitter.positionRow = emitter.radiusRow = emitter.opacityRow = emitter.diffuseRow = emitter.emissionRow = kNoRow;
   emitter.rotationRow = emitter.displacementRow = kNoRow;
   emitter.firstMap = kNoMap;
+  emitter.track = kNoTrack;
   emitter.lifetime[0] = emitter.lifetime[1] = 2;
   emitter.direction[1] = 1;
   emitter.spreadCosine = 1;

@@ -207,6 +207,9 @@ class EffectRules {
       sink_.report(Rule::effectReference, place,
                    fmt::format("{} maps from {} of {}.", emitter.mapCount, emitter.firstMap, tables_.maps.size()));
     }
+    if (emitter.track != kNoTrack && emitter.track >= tables_.tracks.size()) {
+      sink_.report(Rule::effectReference, place, fmt::format("Track {} of {}.", emitter.track, tables_.tracks.size()));
+    }
     if (emitter.material >= tables_.materials.size()) {
       sink_.report(Rule::effectReference, place,
                    fmt::format("Material {} of {}.", emitter.material, tables_.materials.size()));

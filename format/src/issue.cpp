@@ -151,6 +151,10 @@ constexpr IssueKind kCatalogue[] = {
     error(Rule::materialValues, "material-values", "A material's numbers are finite and in range."),
     error(Rule::effectTable, "effect-table",
           "Values of curves lie in [-1000000, 1000000], those of ramps in [0, 1000000]."),
+    error(Rule::trackRanges, "track-ranges",
+          "The tracks divide their frames, and these the bytes, in order and without remainder, within their limits."),
+    error(Rule::trackData, "track-data",
+          "A track's frame is a Draco point cloud of so many points, in order of their numbers, at finite places."),
 };
 
 consteval bool ascending() {

@@ -62,6 +62,9 @@ void readEffects(const ByteSource& source, std::span<const SectionEntry> section
   readTable(source, sections, kSectionCurves, effects.curves, sink);
   readTable(source, sections, kSectionRamps, effects.ramps, sink);
   readTable(source, sections, kSectionCubes, effects.maps, sink);
+  readTable(source, sections, kSectionTracks, effects.tracks, sink);
+  readTable(source, sections, kSectionTrackFrames, effects.trackFrames, sink);
+  readTable(source, sections, kSectionTrackBytes, effects.trackBytes, sink);
 }
 
 }  // namespace
@@ -85,6 +88,7 @@ bool PackReader::read(std::unique_ptr<ByteSource> source, Pack& pack, FileHeader
   checkTables(view(pack), sink);
   checkPageTable(view(pack), sink);
   checkEffects(view(pack), sink);
+  if (checkTracks(view(pack), sink)) loadTracks(view(pack), pack.effects_, sink);
   return sink.errors() == before;
 }
 

@@ -111,25 +111,53 @@ class EmitterRun {
     const double begin = static_cast<double>(cycle) * duration_;
     const double now = time_ - begin;
     const std::uint32_t total = spans_.empty() ? 0 : spans_.back().first + spans_.back().count;
-    const std::uint32_t before = static_cast<std::uint32_t>(static_cast<std::uint64_t>(cycle)) * total;
+    // With a track, all runs are alike.
+    const std::uint32_t run = emitter_.track == kNoTrack ? static_cast<std::uint32_t>(cycle) : 0;
+    const std::uint32_t before = run * total;
     for (const SpawnSpan& span : spans_) {
       const auto [first, last] = candidates(span, now);
       for (std::uint32_t i = first; i < last; ++i) {
         const Dice dice(seed_, number_, before + span.first + i);
-        const double share = (i + dice.draw(Draw::birth)) / span.count;
-        const double from = static_cast<double>(span.begin);
-        const double born = from + (static_cast<double>(span.end) - from) * share;
-        const double age = now - born;
-        const double lifetime = dice.between(Draw::lifetime, emitter_.lifetime);
-        if (age >= 0 && age < lifetime) into.push_back(particle(dice, born, age, lifetime));
+        const Birth birth = birthOf(dice, span, i);
+        const double age = now - birth.time;
+        if (age >= 0 && age < birth.lifetime) into.push_back(particle(dice, birth, age));
       }
     }
+  }
+
+  std::vector<Birth> births() const {
+    std::vector<Birth> all;
+    for (const SpawnSpan& span : spans_) {
+      for (std::uint32_t i = 0; i < span.count; ++i) {
+        const Dice dice(seed_, number_, span.first + i);
+        all.push_back(birthOf(dice, span, i));
+        setOut(dice, all.back());
+      }
+    }
+    return all;
   }
 
  private:
   struct Range {
     std::uint32_t first, last;
   };
+  // All of it but place and velocity.
+  Birth birthOf(const Dice& dice, const SpawnSpan& span, std::uint32_t i) const {
+    const double share = (i + dice.draw(Draw::birth)) / span.count;
+    const double from = static_cast<double>(span.begin);
+    return {span.first + i,
+            from + (static_cast<double>(span.end) - from) * share,
+            dice.between(Draw::lifetime, emitter_.lifetime),
+            {},
+            {}};
+  }
+  void setOut(const Dice& dice, Birth& birth) const {
+    birth.position = place(birth.time);
+    const Vec3 shift = offset(dice);
+    for (std::size_t i = 0; i < 3; ++i) birth.position[i] += shift[i];
+    birth.velocity = startVelocity(dice, birth.time);
+  }
+
   // Which of a span's particles may be alive `now` seconds into the run: a few too many.
   Range candidates(const SpawnSpan& span, double now) const {
     const double begin = static_cast<double>(span.begin), length = static_cast<double>(span.end) - begin;
@@ -212,20 +240,56 @@ class EmitterRun {
     return emitter_.firstMap + static_cast<std::uint32_t>(at - std::floor(at / count) * count) % emitter_.mapCount;
   }
 
-  Particle particle(const Dice& dice, double born, double age, double lifetime) const {
-    const double share = age / lifetime;
-    const Vec3 start = startVelocity(dice, born);
-    const Vec3 from = place(born), shift = offset(dice);
+  struct Motion {
+    Vec3 place, velocity;
+  };
+
+  Motion closedForm(const Birth& birth, double age) const {
+    Motion motion{};
     const double drag = static_cast<double>(emitter_.drag);
     const double mean = decayMean(drag * age), slope = decayMeanSlope(drag * age), left = decay(drag * age);
-    Vec3 speed{};
-    Particle result{};
     for (std::size_t i = 0; i < 3; ++i) {
       const double pull = static_cast<double>(emitter_.gravity[i]) + drag * static_cast<double>(emitter_.wind[i]);
-      speed[i] = start[i] * left + pull * age * mean;
-      result.center[i] = static_cast<float>(from[i] + shift[i] + start[i] * age * mean + pull * age * age * slope);
+      motion.velocity[i] = birth.velocity[i] * left + pull * age * mean;
+      motion.place[i] = birth.position[i] + birth.velocity[i] * age * mean + pull * age * age * slope;
     }
-    const Quaternion turn = rotation(dice, share, speed);
+    return motion;
+  }
+
+  const TrackPoint* findPoint(const TrackRecord& track, double frame, std::uint32_t number) const {
+    if (!(frame < track.frameCount)) return nullptr;
+    const auto& points = tables_.trackPoints[track.firstFrame + static_cast<std::size_t>(frame)];
+    const auto found = std::lower_bound(points.begin(), points.end(), number,
+                                        [](const TrackPoint& point, std::uint32_t n) { return point.number < n; });
+    return found != points.end() && found->number == number ? &*found : nullptr;
+  }
+
+  // On the straight line between two frames, the first of which may be the birth.
+  Motion sampled(const Birth& birth, double age) const {
+    const TrackRecord& track = tables_.tracks[emitter_.track];
+    const double rate = static_cast<double>(track.framesPerSecond), now = birth.time + age;
+    const double frame = std::floor(now * rate);
+    const TrackPoint* before = findPoint(track, frame, birth.number);
+    const TrackPoint* after = findPoint(track, frame + 1, birth.number);
+    Motion motion{before != nullptr ? vec(before->position) : birth.position, {}};
+    if (after == nullptr) return motion;
+    const double begin = before != nullptr ? frame / rate : birth.time;
+    const double length = (frame + 1) / rate - begin;
+    const Vec3 end = vec(after->position);
+    for (std::size_t i = 0; i < 3 && length > 0; ++i) {
+      motion.velocity[i] = (end[i] - motion.place[i]) / length;
+      motion.place[i] += motion.velocity[i] * (now - begin);
+    }
+    return motion;
+  }
+
+  Particle particle(const Dice& dice, Birth birth, double age) const {
+    setOut(dice, birth);
+    const Motion motion = emitter_.track == kNoTrack ? closedForm(birth, age) : sampled(birth, age);
+    const double share = age / birth.lifetime;
+    Particle result{};
+    for (std::size_t i = 0; i < 3; ++i) result.center[i] = static_cast<float>(motion.place[i]);
+    const Quaternion turn = rotation(dice, share, motion.velocity);
     for (std::size_t i = 0; i < 4; ++i) result.rotation[i] = static_cast<float>(turn[i]);
     fillLook(dice, share, result);
     result.map = map(dice, age);
@@ -277,8 +341,9 @@ std::uint64_t bornWithin(const SpawnSpan& span, double from, double to) {
 
 std::uint64_t effectBytes(const EffectTables& tables) {
   const auto bytes = [](const auto& records) { return std::as_bytes(std::span(records)).size(); };
-  return bytes(tables.effects) + bytes(tables.emitters) + bytes(tables.spans) + bytes(tables.materials) +
-         bytes(tables.curves) + bytes(tables.ramps) + bytes(tables.maps);
+  return bytes(tables.tracks) + bytes(tables.trackFrames) + bytes(tables.trackBytes) + bytes(tables.effects) +
+         bytes(tables.emitters) + bytes(tables.spans) + bytes(tables.materials) + bytes(tables.curves) +
+         bytes(tables.ramps) + bytes(tables.maps);
 }
 
 float sampleCurve(const CurveRow& row, float x) {
@@ -322,6 +387,10 @@ std::uint64_t mostAlive(const EffectTables& tables, const EffectRecord& effect) 
     sum += mostAlive(emitter, spans, effect.duration, (effect.flags & kEffectLoop) != 0);
   }
   return sum;
+}
+
+std::vector<Birth> birthsOf(const EffectTables& tables, const EffectRecord& effect, std::uint32_t emitter) {
+  return EmitterRun(tables, effect, emitter, 0).births();
 }
 
 std::vector<Particle> particlesAt(const EffectTables& tables, std::uint32_t effect, double time) {

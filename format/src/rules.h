@@ -126,6 +126,8 @@ enum class Rule : std::uint16_t {
   materialProfile = 707,
   materialValues = 708,
   effectTable = 709,
+  trackRanges = 710,
+  trackData = 711,
 };
 
 // The catalogue's entry; the id must be in it.
@@ -208,6 +210,9 @@ struct TableView {
 void checkTables(const TableView& tables, IssueSink& sink);
 void checkPageTable(const TableView& tables, IssueSink& sink);  // page_table_rules.cpp
 void checkEffects(const TableView& tables, IssueSink& sink);    // effect_rules.cpp
+bool checkTracks(const TableView& tables, IssueSink& sink);     // track_rules.cpp; false: frames cannot be found
+// Decodes the frames, after checkTracks(). `effects` are those of the view.
+void loadTracks(const TableView& tables, EffectTables& effects, IssueSink& sink);
 // Whether the name can be used; `seen` are the names that it must differ from, and gets it.
 void checkName(const TableView& tables, StringRef ref, const Place& place, std::set<std::string_view>& seen,
                IssueSink& sink);

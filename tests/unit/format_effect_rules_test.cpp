@@ -1,4 +1,6 @@
 // What makes an effect's tables unsound, and that no bytes do harm.
+#include <draco/compression/expert_encode.h>
+#include <draco/point_cloud/point_cloud_builder.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -20,6 +22,25 @@ namespace {
 
 using namespace format;
 using tests::packTables;
+
+std::vector<std::byte> trackFrame(const std::vector<TrackPoint>& points) {
+  draco::PointCloudBuilder builder;
+  builder.Start(static_cast<std::uint32_t>(points.size()));
+  const int position = builder.AddAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32);
+  const int number = builder.AddAttribute(draco::GeometryAttribute::GENERIC, 1, draco::DT_UINT32);
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    builder.SetAttributeValueForPoint(position, draco::PointIndex(i), points[i].position);
+    builder.SetAttributeValueForPoint(number, draco::PointIndex(i), &points[i].number);
+  }
+  const auto cloud = builder.Finalize(false);
+  draco::ExpertEncoder encoder(*cloud);
+  encoder.SetAttributeQuantization(position, 12);
+  encoder.SetEncodingMethod(draco::POINT_CLOUD_SEQUENTIAL_ENCODING);
+  draco::EncoderBuffer buffer;
+  EXPECT_TRUE(encoder.EncodeToBuffer(&buffer).ok());
+  const auto* first = reinterpret_cast<const std::byte*>(buffer.data());
+  return {first, first + buffer.size()};
+}
 
 // Two effects that use everything there is.
 EffectTables fullEffects() {
@@ -51,6 +72,15 @@ EffectTables fullEffects() {
   tables.emitters.push_back(emitter);
   tables.spans.push_back({0, 0.5f, 0, 10});
   tables.spans.push_back({0.75f, 0.75f, 10, 5});
+  tables.tracks.push_back({0, 3, 30, 0});
+  tables.emitters[1].track = 0;
+  for (std::uint32_t f = 0; f < 3; ++f) {
+    std::vector<TrackPoint> points;
+    for (std::uint32_t i = 0; i < 3; ++i) points.push_back({i * 2, {static_cast<float>(f + i), 1, 2}});
+    const std::vector<std::byte> bytes = trackFrame(points);
+    tables.trackFrames.push_back({tables.trackBytes.size(), static_cast<std::uint32_t>(bytes.size()), 3});
+    tables.trackBytes.insert(tables.trackBytes.end(), bytes.begin(), bytes.end());
+  }
   for (CurveRow& row : tables.curves) std::fill_n(row.values, kCurveSamples, 0.5f);
   return tables;
 }
@@ -94,6 +124,11 @@ TEST(EffectRules, SoundOnesComeBackAsTheyWere) {
   EXPECT_TRUE(same(pack->effects().curves, tables.curves));
   EXPECT_TRUE(same(pack->effects().ramps, tables.ramps));
   EXPECT_TRUE(same(pack->effects().maps, tables.maps));
+  EXPECT_TRUE(same(pack->effects().tracks, tables.tracks));
+  EXPECT_TRUE(same(pack->effects().trackFrames, tables.trackFrames));
+  ASSERT_EQ(pack->effects().trackPoints.size(), 3u);
+  EXPECT_EQ(pack->effects().trackPoints[1][2].number, 4u);
+  EXPECT_NEAR(pack->effects().trackPoints[1][2].position[0], 3, 1e-3f);
   EXPECT_EQ(pack->string(pack->effects().effects[1].name), "effect 1");
   EXPECT_FALSE(particlesAt(pack->effects(), 1, 0.9).empty());
 }
@@ -163,8 +198,18 @@ TEST(EffectRules, EveryBrokenRuleIsTold) {
       {708, [](EffectTables& t) { t.materials[0].occlusion = -1; }},
       {709, [](EffectTables& t) { t.curves[0].values[63] = kNan; }},
       {709, [](EffectTables& t) { t.ramps[0].values[15][31][3] = -1; }},
+      {706, [](EffectTables& t) { t.emitters[0].track = 1; }},
+      {710, [](EffectTables& t) { t.tracks[0].frameCount = 2; }},
+      {710, [](EffectTables& t) { t.tracks[0].framesPerSecond = kNan; }},
+      {710, [](EffectTables& t) { t.tracks[0].reserved = 1; }},
+      {710, [](EffectTables& t) { t.tracks.clear(), t.emitters[1].track = kNoTrack; }},
+      {710, [](EffectTables& t) { t.trackFrames[1].offset = 1; }},
+      {710, [](EffectTables& t) { t.trackFrames[0].count = kMaxTrackPoints + 1; }},
+      {710, [](EffectTables& t) { t.trackBytes.push_back({}); }},
+      {711, [](EffectTables& t) { t.trackFrames[0].count = 1; }},
+      {711, [](EffectTables& t) { t.trackBytes[0] = std::byte{'X'}; }},
       {215, [](EffectTables& t) { t.effects[0].reserved[4] = 1; }},
-      {215, [](EffectTables& t) { t.emitters[0].reserved[7] = 1; }},
+      {215, [](EffectTables& t) { t.emitters[0].reserved[6] = 1; }},
   };
   for (std::size_t i = 0; i < faults.size(); ++i) {
     EffectTables tables = fullEffects();
@@ -207,7 +252,8 @@ TEST(EffectRules, WhatOpensDoesNoHarm) {
   int opened = 0;
   for (int round = 0; round < 4000; ++round) {
     std::vector<std::byte> bytes = sound;
-    const SectionEntry& section = pack->sections()[8 + random() % 5];  // EFCT to CURV
+    constexpr std::size_t kSections[] = {8, 9, 10, 11, 12, 15, 16, 17, 17};  // without ramps and maps
+    const SectionEntry& section = pack->sections()[kSections[random() % std::size(kSections)]];
     for (int i = 0; i < 1 + round % 3; ++i) {
       bytes[section.offset + random() % section.size] = static_cast<std::byte>(random() & 255);
     }
@@ -221,7 +267,12 @@ TEST(EffectRules, WhatOpensDoesNoHarm) {
 }
 
 TEST(EffectRules, SectionsOfHalfARecordAreRefused) {
-  std::vector<std::byte> bytes = packBytes(fullEffects());
+  EffectTables tables = fullEffects();
+  tables.emitters[1].track = kNoTrack;
+  tables.tracks.clear();
+  tables.trackFrames.clear();
+  tables.trackBytes.clear();
+  std::vector<std::byte> bytes = packBytes(tables);
   const Result<Pack> pack = Pack::open(makeMemorySource(bytes));
   ASSERT_TRUE(pack);
   const auto& sections = pack->sections();

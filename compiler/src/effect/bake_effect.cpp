@@ -1,10 +1,13 @@
 #include "effect/bake_effect.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstring>
 #include <utility>
 
 #include "effect/noise_map.h"
+#include "effect/simulate.h"
 
 namespace billow::compiler {
 namespace {
@@ -21,7 +24,14 @@ class Baker {
     record.flags = effect.flags;
     record.seed = effect.seed;
     record.duration = effect.duration;
-    for (const EmitterDescription& emitter : effect.emitters) addEmitter(emitter, effect.duration);
+    for (std::uint32_t e = 0; e < record.emitterCount; ++e) {
+      addEmitter(effect.emitters[e], effect.duration);
+      if (!needsTrack(effect.emitters[e])) continue;
+      const std::string where = fmt::format("{}: emitters[{}]", effect.file, e);
+      const TrackPoints points = simulate(birthsOf(effects_, record, e), effect.emitters[e], where);
+      effects_.emitters.back().track =
+          addTrack(points, effect.emitters[e].trackRate, effect.emitters[e].trackError, where, effects_);
+    }
     effects_.effects.push_back(record);
   }
 
@@ -51,6 +61,7 @@ class Baker {
       record.mapCount = 1;
     }
     record.material = material(emitter);
+    record.track = format::kNoTrack;
     effects_.emitters.push_back(record);
   }
 

@@ -39,6 +39,19 @@ struct NoiseMap {
   bool operator==(const NoiseMap&) const = default;
 };
 
+// A wind in whirls, which drag passes on.
+struct CurlNoise {
+  double speed;      // world units a second, typical
+  double frequency;  // periods a world unit
+  std::uint32_t seed;
+};
+
+struct Attractor {
+  std::array<double, 3> position;
+  double strength;  // acceleration at the distance `radius`, doubled
+  double radius;    // where it is greatest
+};
+
 struct EmitterDescription {
   std::string name;
   format::EmitterRecord record{};  // its numbers; what refers to tables comes with the tables
@@ -49,8 +62,16 @@ struct EmitterDescription {
   Keys profile;
   std::vector<RampRow> diffuseRamp, emissionRamp;
   std::optional<NoiseMap> map;
+  std::optional<CurlNoise> curlNoise;
+  std::optional<Attractor> attractor;
+  float trackRate = 30;          // frames a second, where there is one of these two
+  double trackError = 0;         // world units
   std::optional<Image> picture;  // of the displacement, instead of noise: longitude and latitude
 };
+
+inline bool needsTrack(const EmitterDescription& emitter) {
+  return emitter.curlNoise || emitter.attractor;
+}
 
 struct EffectDescription {
   std::string file;

@@ -8,6 +8,7 @@
 #include "billow/format/exact_math.h"
 #include "billow/format/noise.h"
 #include "effect/bc4.h"
+#include "effect/gradient_noise.h"
 #include "parallel.h"
 
 namespace billow::compiler {
@@ -18,15 +19,6 @@ using Vec3 = std::array<double, 3>;
 constexpr std::uint32_t kEdge = format::kCubeEdge;
 constexpr std::size_t kFaceTexels = std::size_t{kEdge} * kEdge;
 constexpr std::size_t kMapTexels = kFaceTexels * format::kCubeFaces;
-
-// Quintic, so that slopes and curvatures meet (Perlin 2002, "Improving Noise").
-double fade(double f) {
-  return f * f * f * (f * (f * 6 - 15) + 10);
-}
-
-double mix(double a, double b, double share) {
-  return a + (b - a) * share;
-}
 
 struct Lattice {
   int at[3];
@@ -40,26 +32,6 @@ Lattice latticeOf(const Vec3& p) {
     lattice.share[i] = p[i] - whole;
   }
   return lattice;
-}
-
-// The slope at a lattice point times the way from it: one of the twelve directions to the edges of a cube.
-double slope(std::uint32_t hash, double x, double y, double z) {
-  const std::uint32_t which = hash >> 28;
-  const double u = which < 8 ? x : y;
-  const double v = which < 4 ? y : which == 12 || which == 14 ? x : z;
-  return ((which & 1) != 0 ? -u : u) + ((which & 2) != 0 ? -v : v);
-}
-
-// Gradient noise, about [-1, 1].
-double gradientNoise(const Vec3& p, std::uint32_t seed) {
-  const Lattice l = latticeOf(p);
-  const auto corner = [&](int x, int y, int z) {
-    return slope(format::hashPoint(l.at[0] + x, l.at[1] + y, l.at[2] + z, seed), l.share[0] - x, l.share[1] - y,
-                 l.share[2] - z);
-  };
-  const double sx = fade(l.share[0]), sy = fade(l.share[1]), sz = fade(l.share[2]);
-  const auto row = [&](int y, int z) { return mix(corner(0, y, z), corner(1, y, z), sx); };
-  return mix(mix(row(0, 0), row(1, 0), sy), mix(row(0, 1), row(1, 1), sy), sz);
 }
 
 // The distance to the nearest of one random point in each lattice cell (Worley 1996), at most about 1.

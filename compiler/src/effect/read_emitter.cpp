@@ -60,10 +60,37 @@ void readVelocity(const Value& value, format::EmitterRecord& record) {
   }
 }
 
-void readForces(const Value& value, format::EmitterRecord& record) {
-  value.requireKeys({"gravity", "drag", "wind"});
+CurlNoise readCurlNoise(const Value& value, const format::EmitterRecord& record) {
+  value.requireKeys({"speed", "frequency", "seed"});
+  if (!(record.drag > 0)) value.fail("a drag above 0 beside it: without drag, wind moves nothing");
+  CurlNoise noise{value.at("speed").number({0, 1000}), value.at("frequency").number({1e-4, 1000}), 0};
+  if (const auto seed = value.find("seed")) noise.seed = static_cast<std::uint32_t>(seed->integer(0, 0xffffffff));
+  return noise;
+}
+
+Attractor readAttractor(const Value& value) {
+  value.requireKeys({"position", "strength", "radius"});
+  return {value.at("position").numbers<3>(kAny), value.at("strength").number({-1000, 1000}),
+          value.at("radius").number({0.001, kMost})};
+}
+
+void readTracks(const Value& value, EmitterDescription& emitter) {
+  value.requireKeys({"framesPerSecond", "error"});
+  if (!needsTrack(emitter)) value.fail("forces.curlNoise or forces.attractor beside it: other motion needs no track");
+  if (const auto rate = value.find("framesPerSecond")) {
+    emitter.trackRate =
+        rate->single({static_cast<double>(format::kMinTrackRate), static_cast<double>(format::kMaxTrackRate)});
+  }
+  if (const auto error = value.find("error")) emitter.trackError = error->number({1e-6, kMost});
+}
+
+void readForces(const Value& value, EmitterDescription& emitter) {
+  value.requireKeys({"gravity", "drag", "wind", "curlNoise", "attractor"});
+  format::EmitterRecord& record = emitter.record;
   if (const auto gravity = value.find("gravity")) readVector(*gravity, record.gravity);
   if (const auto drag = value.find("drag")) record.drag = drag->single({0, static_cast<double>(format::kMaxDrag)});
+  if (const auto noise = value.find("curlNoise")) emitter.curlNoise = readCurlNoise(*noise, record);
+  if (const auto attractor = value.find("attractor")) emitter.attractor = readAttractor(*attractor);
   const auto wind = value.find("wind");
   if (!wind) return;
   readVector(*wind, record.wind);
@@ -118,7 +145,7 @@ void readBursts(const Value& value, double duration, EmitterDescription& emitter
 
 EmitterDescription readEmitter(const Value& value, float duration, const std::filesystem::path& folder) {
   value.requireKeys({"name", "shape", "position", "rate", "bursts", "lifetime", "velocity", "inheritedVelocity",
-                     "forces", "primitive"});
+                     "forces", "tracks", "primitive"});
   EmitterDescription emitter;
   format::EmitterRecord& record = emitter.record;
   const double seconds = static_cast<double>(duration);
@@ -133,8 +160,11 @@ EmitterDescription readEmitter(const Value& value, float duration, const std::fi
   readSpan(value.at("lifetime"), {0.001, static_cast<double>(format::kMaxLifetime)}, record.lifetime);
   if (const auto velocity = value.find("velocity")) readVelocity(*velocity, record);
   if (const auto share = value.find("inheritedVelocity")) record.inheritance = share->single({-10, 10});
-  if (const auto forces = value.find("forces")) readForces(*forces, record);
+  if (const auto forces = value.find("forces")) readForces(*forces, emitter);
   readPrimitive(value.at("primitive"), folder, emitter);
+  // A hundredth of a typical radius is not seen.
+  emitter.trackError = record.radius[1] > 0 ? static_cast<double>(record.radius[1]) / 100 : 0.01;
+  if (const auto tracks = value.find("tracks")) readTracks(*tracks, emitter);
   return emitter;
 }
 

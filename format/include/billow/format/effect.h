@@ -10,6 +10,7 @@
 #include "billow/format/cube_map.h"
 #include "billow/format/layout.h"
 #include "billow/format/particle.h"
+#include "billow/format/track.h"
 
 namespace billow::format {
 
@@ -93,7 +94,8 @@ struct EmitterRecord {
   std::uint32_t mapCount;  // several: one after another, in a circle
   float mapsPerSecond;
   std::uint32_t material;
-  std::uint32_t reserved[8];
+  std::uint32_t track;  // kNoTrack: motion in closed form, by the numbers above
+  std::uint32_t reserved[7];
 };
 static_assert(sizeof(EmitterRecord) == 256);
 
@@ -112,6 +114,10 @@ struct EffectTables {
   std::vector<CurveRow> curves;
   std::vector<RampTable> ramps;
   std::vector<CubeMap> maps;
+  std::vector<TrackRecord> tracks;
+  std::vector<TrackFrame> trackFrames;
+  std::vector<std::byte> trackBytes;
+  std::vector<std::vector<TrackPoint>> trackPoints;  // the frames decoded, as an open pack has them; not written
 
   bool empty() const { return effects.empty(); }
 };
@@ -127,6 +133,16 @@ float sampleCurve(const CurveRow& row, float x);
 std::uint64_t mostAlive(const EmitterRecord& emitter, std::span<const SpawnSpan> spans, float duration, bool loop);
 // Of all emitters of an effect.
 std::uint64_t mostAlive(const EffectTables& tables, const EffectRecord& effect);
+
+// How a particle sets out.
+struct Birth {
+  std::uint32_t number;  // in the run
+  double time;           // seconds into the run
+  double lifetime;       // seconds
+  std::array<double, 3> position, velocity;
+};
+// All of one run of an emitter of the effect, in order of numbers; the first run, or any of an emitter with a track.
+std::vector<Birth> birthsOf(const EffectTables& tables, const EffectRecord& effect, std::uint32_t emitter);
 
 // What is alive of an effect `time` seconds after its begin, in [0, kMaxEffectTime], else nothing; by emitter, then in
 // order of birth's number. The same bits on every machine. `tables` must keep the rules (those of an open pack do).

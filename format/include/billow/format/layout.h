@@ -141,13 +141,16 @@ inline constexpr std::uint32_t kSectionPageTable = fourcc('P', 'D', 'I', 'R');  
 inline constexpr std::uint32_t kSectionPages = fourcc('P', 'A', 'G', 'E');       // the pages, one after another
 inline constexpr std::uint32_t kSectionInfo = fourcc('I', 'N', 'F', 'O');        // optional: JSON, provenance
 // Optional: effects (effect.h).
-inline constexpr std::uint32_t kSectionEffects = fourcc('E', 'F', 'C', 'T');    // EffectRecord[]
-inline constexpr std::uint32_t kSectionEmitters = fourcc('E', 'M', 'I', 'T');   // EmitterRecord[]
-inline constexpr std::uint32_t kSectionSpans = fourcc('S', 'P', 'W', 'N');      // SpawnSpan[]
-inline constexpr std::uint32_t kSectionMaterials = fourcc('M', 'T', 'R', 'L');  // ParticleMaterial[]
-inline constexpr std::uint32_t kSectionCurves = fourcc('C', 'U', 'R', 'V');     // CurveRow[]
-inline constexpr std::uint32_t kSectionRamps = fourcc('R', 'A', 'M', 'P');      // RampTable[]
-inline constexpr std::uint32_t kSectionCubes = fourcc('C', 'U', 'B', 'E');      // CubeMap[]
+inline constexpr std::uint32_t kSectionEffects = fourcc('E', 'F', 'C', 'T');      // EffectRecord[]
+inline constexpr std::uint32_t kSectionEmitters = fourcc('E', 'M', 'I', 'T');     // EmitterRecord[]
+inline constexpr std::uint32_t kSectionSpans = fourcc('S', 'P', 'W', 'N');        // SpawnSpan[]
+inline constexpr std::uint32_t kSectionMaterials = fourcc('M', 'T', 'R', 'L');    // ParticleMaterial[]
+inline constexpr std::uint32_t kSectionCurves = fourcc('C', 'U', 'R', 'V');       // CurveRow[]
+inline constexpr std::uint32_t kSectionRamps = fourcc('R', 'A', 'M', 'P');        // RampTable[]
+inline constexpr std::uint32_t kSectionCubes = fourcc('C', 'U', 'B', 'E');        // CubeMap[]
+inline constexpr std::uint32_t kSectionTracks = fourcc('T', 'R', 'C', 'K');       // TrackRecord[]
+inline constexpr std::uint32_t kSectionTrackFrames = fourcc('T', 'R', 'F', 'R');  // TrackFrame[]
+inline constexpr std::uint32_t kSectionTrackBytes = fourcc('T', 'R', 'P', 'T');   // point clouds, one after another
 
 inline constexpr std::uint32_t kSectionRequired = 1;  // SectionEntry.flags: a reader that does not know it must refuse
 
