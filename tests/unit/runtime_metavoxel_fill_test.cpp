@@ -183,6 +183,16 @@ TEST_F(MetavoxelFill, EmissionAddsAndNeedsNoLight) {
   }
 }
 
+TEST_F(MetavoxelFill, WhatIsTooThinToCountIsNotSeen) {
+  const auto metavoxels = make(smallConfig());
+  MetavoxelDraw draw = smallDraw();
+  const std::vector<Particle> one{ball({0, 0, 0}, 1, 2)}, both{one[0], ball({0.3f, 0, 0}, 3, 1e-7f)};
+  draw.particles = one;
+  const headless::Picture alone = render(*metavoxels, draw);
+  draw.particles = both;
+  EXPECT_LT(largestDifference(alone, render(*metavoxels, draw)), 1e-4f);
+}
+
 TEST_F(MetavoxelFill, OrderOfParticlesChangesNothing) {
   std::vector<Particle> particles;
   std::mt19937 random(3);
