@@ -98,7 +98,10 @@ double turnsOf(double sine, double cosine) {
 double cubeRoot(double x) {
   if (!(x > 0)) return 0;
   double scale = 1;
-  for (; x < 0.125; x *= 8) scale /= 2;
+  while (x < 0.125) {
+    x *= 8;
+    scale /= 2;
+  }
   double root = (3 + 4 * x) / 7;
   for (int i = 0; i < 5; ++i) root -= (root - x / (root * root)) / 3;
   return root * scale;

@@ -34,6 +34,10 @@ TEST(CommandEffect, CompileInfoValidateExtract) {
             std::string::npos);
   const auto extracted = shell("$BILLOW extract " + pack + " --effect explosion --time 0.5 --voxel-size 0.2 -o " + vdb);
   ASSERT_EQ(extracted.code, 0) << extracted.err;
+  // Also the same bytes again, the file's UUID included.
+  const std::string second = folder / "again.vdb";
+  ASSERT_EQ(shell("$BILLOW extract " + pack + " --effect explosion --time 0.5 --voxel-size 0.2 -o " + second).code, 0);
+  EXPECT_TRUE(tests::readFile(vdb) == tests::readFile(second));
   // What was written is a volume like any other.
   const auto again = shell("$BILLOW compile " + vdb + " -o " + (folder / "v.blw") + " --json");
   ASSERT_EQ(again.code, 0) << again.err;

@@ -3,9 +3,14 @@
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
+#include <xxhash.h>
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <memory>
+#include <new>
+#include <stdexcept>
 
 #include "billow/format/temp_file.h"
 #include "import/vdb_file.h"
@@ -82,6 +87,30 @@ openvdb::GridBase::Ptr makeGrid(const VdbOutput& output) {
   return grid;
 }
 
+// OpenVDB gives each file a random UUID; one from the file's other bytes makes equal grids equal files.
+void nameByContent(const std::string& path) {
+  constexpr std::streamoff kUuid = 21;  // after magic, versions and the flag for offsets
+  constexpr std::size_t kUuidBytes = 36;
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  std::vector<char> piece(std::size_t{1} << 20);
+  const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), &XXH3_freeState);
+  if (!state) throw std::bad_alloc();
+  XXH3_128bits_reset(state.get());
+  file.seekg(kUuid + static_cast<std::streamoff>(kUuidBytes));
+  while (file.read(piece.data(), static_cast<std::streamsize>(piece.size())) || file.gcount() > 0) {
+    XXH3_128bits_update(state.get(), piece.data(), static_cast<std::size_t>(file.gcount()));
+  }
+  const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
+  const std::string uuid =
+      fmt::format("{:08x}-{:04x}-{:04x}-{:04x}-{:012x}", hash.high64 >> 32, hash.high64 >> 16 & 0xffff,
+                  hash.high64 & 0xffff, hash.low64 >> 48, hash.low64 & 0xffffffffffff);
+  file.clear();
+  file.seekp(kUuid);
+  file.write(uuid.data(), static_cast<std::streamsize>(uuid.size()));
+  file.flush();
+  if (!file) throw std::runtime_error("its header cannot be changed");
+}
+
 // OpenVDB does not always notice a full disk, so what was written is looked at before it gets its name.
 void checkWritten(const std::string& path) {
   const VdbFile file = listVdbFile(path);
@@ -100,6 +129,7 @@ void writeVdb(const std::string& path, std::span<const VdbOutput> grids) {
     file.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
     file.write(made);
     file.close();
+    nameByContent(target.temporaryPath());
     checkWritten(target.temporaryPath());
   } catch (const std::bad_alloc&) {
     throw;
