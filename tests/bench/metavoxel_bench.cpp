@@ -192,7 +192,7 @@ void measure(headless::Headless& gpu, const format::Pack& pack, const Options& o
   const auto frame = valueOf(renderer->upload(pack, 0, frameIndex, {.grids = grids}));
   const runtime::MetavoxelConfig config{.metavoxels = scene.metavoxels,
                                         .memoryBudget = scene.budget,
-                                        .maxMetavoxels = 8192,
+                                        .maxMetavoxels = 6144,
                                         .maxListEntries = 1u << 20,
                                         .tables = &tables};
   const auto metavoxels = valueOf(runtime::Metavoxels::create(*renderer, config));
