@@ -1,0 +1,72 @@
+#include "billow/format/effect.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+namespace billow::format {
+namespace {
+
+// At most so many of a span's particles are born in [from, to].
+std::uint64_t bornWithin(const SpawnSpan& span, double from, double to) {
+  const double begin = static_cast<double>(span.begin), end = static_cast<double>(span.end);
+  const double overlap = std::min(end, to) - std::max(begin, from);
+  if (overlap < 0) return 0;
+  if (!(end > begin)) return span.count;
+  const double share = overlap / (end - begin) * span.count;
+  return std::min<std::uint64_t>(span.count, static_cast<std::uint64_t>(share) + 2);
+}
+
+}  // namespace
+
+std::uint64_t effectBytes(const EffectTables& tables) {
+  const auto bytes = [](const auto& records) { return std::as_bytes(std::span(records)).size(); };
+  return bytes(tables.tracks) + bytes(tables.trackFrames) + bytes(tables.trackBytes) + bytes(tables.effects) +
+         bytes(tables.emitters) + bytes(tables.spans) + bytes(tables.materials) + bytes(tables.curves) +
+         bytes(tables.ramps) + bytes(tables.maps);
+}
+
+float sampleCurve(const CurveRow& row, float x) {
+  const float at = std::clamp(x, 0.0f, 1.0f) * static_cast<float>(kCurveSamples - 1);
+  const std::size_t index = std::min<std::size_t>(static_cast<std::size_t>(at), kCurveSamples - 2);
+  return row.values[index] + (row.values[index + 1] - row.values[index]) * (at - static_cast<float>(index));
+}
+
+// The number born within a window changes its slope only where the window's ends meet those of a span, so it is largest
+// with the window's end at one of these.
+std::uint64_t mostAlive(const EmitterRecord& emitter, std::span<const SpawnSpan> spans, float duration, bool loop) {
+  constexpr double kSlack = 1e-6;  // seconds; far above what rounding may move
+  const double life = static_cast<double>(emitter.lifetime[1]), period = static_cast<double>(duration);
+  const double runs = loop ? std::floor(life / period) : 0;
+  const double window = life - runs * period;
+  std::uint64_t total = 0, most = 0;
+  const auto count = [&](double end) {
+    std::uint64_t born = 0;
+    for (const SpawnSpan& span : spans) {
+      born += bornWithin(span, end - window - kSlack, end + kSlack);
+      if (loop) born += bornWithin(span, end - window - kSlack + period, end + kSlack + period);
+    }
+    most = std::max(most, born);
+  };
+  for (const SpawnSpan& span : spans) {
+    total += span.count;
+    for (const float edge : {span.begin, span.end}) {
+      const double at = static_cast<double>(edge);
+      count(at);
+      count(loop && at + window > period ? at + window - period : at + window);
+    }
+  }
+  return most + total * static_cast<std::uint64_t>(runs);
+}
+
+std::uint64_t mostAlive(const EffectTables& tables, const EffectRecord& effect) {
+  std::uint64_t sum = 0;
+  for (std::uint32_t i = 0; i < effect.emitterCount; ++i) {
+    const EmitterRecord& emitter = tables.emitters[effect.firstEmitter + i];
+    const auto spans = std::span(tables.spans).subspan(emitter.firstSpan, emitter.spanCount);
+    sum += mostAlive(emitter, spans, effect.duration, (effect.flags & kEffectLoop) != 0);
+  }
+  return sum;
+}
+
+}  // namespace billow::format
