@@ -59,6 +59,26 @@ vec4 readSlot(uint slot, vec3 inCell) {
   return textureLod(lit, (vec3(slotCorner(slot)) + inCell + 1.0) / vec3(textureSize(lit, 0)), 0.0);
 }
 
+// Samples lie at (k + shift) * dt. All in distance; `stop` is where the space or the scene ends.
+struct Steps {
+  float dt;
+  float shift;
+  float end;   // of the scene
+  float stop;  // of samples
+};
+
+// From sample k on through a box of texels of one metavoxel, to sample `next`.
+void marchBox(Ray ray, Steps steps, uint slot, vec3 corner, float next, float seen, inout float k, inout Sum sum) {
+  for (; k < next && sum.transmittance * seen > kOpaque; k += 1.0) {
+    const float t = (k + steps.shift) * steps.dt;
+    // A step that crosses the scene counts for what lies before it.
+    const float length = min(steps.dt, steps.end - (t - 0.5 * steps.dt));
+    if (t >= steps.stop || length <= 0.0) return;
+    const vec3 inCell = clamp(ray.origin + ray.direction * t - corner, 0.0, float(innerVoxels()));
+    shade(readSlot(slot, inCell), t / ray.perDepth, length, sum);
+  }
+}
+
 Sum march(Ray ray, float end, float shift, float seen) {
   Sum sum = Sum(vec3(0.0), 1.0, 0.0);
   const MetavoxelCounters counters = Counters(meta.ramps.zw).value;
@@ -67,32 +87,30 @@ Sum march(Ray ray, float end, float shift, float seen) {
   const float inner = float(innerVoxels());
   const vec2 span = crossBox(ray, vec3(box.low) * inner, vec3(box.high) * inner);
   const float dt = params.forward.w * meta.eye.w * ray.perDepth;
-  const float stop = min(span.y, end);
-  if (range.y == 0u || !(max(span.x, 0.0) < stop)) return sum;
+  const Steps steps = Steps(dt, shift, end, min(span.y, end + 0.5 * dt));
+  if (range.y == 0u || !(max(span.x, 0.0) < steps.stop)) return sum;
   float k = max(ceil(span.x / dt - shift), 0.0);
   while (sum.transmittance * seen > kOpaque) {
     const float t = (k + shift) * dt;
-    // A step that crosses the end counts for what lies before it.
-    const float length = min(dt, end - (t - 0.5 * dt));
-    if (t >= span.y || length <= 0.0) break;
+    if (t >= steps.stop) break;
     const vec3 voxel = ray.origin + ray.direction * t;
     const vec3 cell = clamp(floor(voxel / inner), vec3(box.low), vec3(box.high - 1u));
     const vec3 corner = cell * inner;
     const uint slot = positionOf(uvec3(cell)) - range.x;
     vec3 low = corner;
     vec3 high = corner + inner;
+    bool near = false;
     if (slot < range.y) {
-      const vec3 inCell = clamp(voxel - corner, 0.0, inner);
-      const vec3 block = floor((inCell + 1.0) / float(kSubBlock));
-      if ((blockHolds(slot, uvec3(block)) & kBlockNear) != 0u) {
-        shade(readSlot(slot, inCell), t / ray.perDepth, length, sum);
-        k += 1.0;
-        continue;
-      }
+      // The box is the part of the cell in one block of texels.
+      const vec3 block = floor((clamp(voxel - corner, 0.0, inner) + 1.0) / float(kSubBlock));
+      near = (blockHolds(slot, uvec3(block)) & kBlockNear) != 0u;
       low = max(low, corner - 1.0 + block * float(kSubBlock));
       high = min(high, corner - 1.0 + (block + 1.0) * float(kSubBlock));
     }
-    k = max(k + 1.0, ceil(crossBox(ray, low, high).y / dt - shift));
+    const float next = max(k + 1.0, ceil(crossBox(ray, low, high).y / dt - shift));
+    if (near) marchBox(ray, steps, slot, corner, next, seen, k, sum);
+    if (near && k < next) break;  // opaque, or at the end
+    k = next;
   }
   return sum;
 }
