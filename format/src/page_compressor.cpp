@@ -14,18 +14,18 @@ namespace {
 
 using Context = std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)>;
 
-constexpr int kZstdLevel = 3;
+constexpr int kZstdLevel = 3, kQuickLevel = 1;
 
-std::vector<std::byte> compressZstd(ZSTD_CCtx* context, std::span<const std::byte> raw) {
+std::vector<std::byte> compressZstd(ZSTD_CCtx* context, std::span<const std::byte> raw, int level) {
   std::vector<std::byte> stored(ZSTD_compressBound(raw.size()));
-  const std::size_t size = ZSTD_compressCCtx(context, stored.data(), stored.size(), raw.data(), raw.size(), kZstdLevel);
+  const std::size_t size = ZSTD_compressCCtx(context, stored.data(), stored.size(), raw.data(), raw.size(), level);
   if (ZSTD_isError(size)) throw std::runtime_error(ZSTD_getErrorName(size));
   stored.resize(size);
   return stored;
 }
 
-// Whether the model did so well on a page of the usual size that zstd hardly ever needs fewer bytes: to see would cost
-// a third of the time again.
+// Whether the model did so well on a page of the usual size that zstd needs fewer bytes only where content repeats: a
+// quick look tells, at a fraction of the time.
 constexpr bool isWell(std::size_t stored, std::size_t raw) {
   return raw >= std::size_t{1} << 15 && stored <= raw / 8 * 5;
 }
@@ -34,9 +34,10 @@ CompressedPage compress(ZSTD_CCtx* context, std::vector<std::byte> raw, const Pa
   std::vector<std::byte> modelled;
   if (compression == Compression::small) {
     modelled = encodePage(runs, raw);
-    if (isWell(modelled.size(), raw.size())) return {std::move(modelled), Codec::model};
+    if (isWell(modelled.size(), raw.size()) && compressZstd(context, raw, kQuickLevel).size() >= modelled.size())
+      return {std::move(modelled), Codec::model};
   }
-  CompressedPage page{compressZstd(context, raw), Codec::zstd};
+  CompressedPage page{compressZstd(context, raw, kZstdLevel), Codec::zstd};
   if (compression == Compression::small && modelled.size() < page.stored.size())
     page = {std::move(modelled), Codec::model};
   if (page.stored.size() >= raw.size()) return {std::move(raw), Codec::raw};

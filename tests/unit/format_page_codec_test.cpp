@@ -10,6 +10,7 @@
 #include <random>
 
 #include "../../format/src/page_coder/token_tables.h"
+#include "../../format/src/page_compressor.h"
 #include "billow/format/pack.h"
 #include "page_builder.h"
 #include "sample_pack.h"
@@ -168,6 +169,23 @@ TEST(PageCodec, WriterTakesTheSmallerAndTheBytesDependOnNothingElse) {
     EXPECT_EQ(a.readPage(i)->raw, b.readPage(i)->raw);
   }
   EXPECT_TRUE(modelled);
+}
+
+TEST(PageCodec, RepeatedContentGoesToZstdHoweverWellTheModelDoes) {
+  PageBuilder builder(9);
+  for (int i = 0; i < 100; ++i) builder.brick(kEncodingUniform16, kMaskAll);
+  PageBuilder::Page page = builder.page();
+  constexpr std::ptrdiff_t kPeriod = 9 * 1024;
+  for (auto at = page.bytes.begin(); at + 2 * kPeriod <= page.bytes.begin() + 100 * 1024; at += kPeriod)
+    std::copy_n(at, kPeriod, at + kPeriod);
+  for (std::size_t high = 1; high < 100 * 1024; high += 2) page.bytes[high] = std::byte{7};
+  const std::size_t modelled = roundTrip(page).size();
+  ASSERT_LT(modelled, page.bytes.size() * 5 / 8);
+  PageCompressor compressor(Compression::small, 1);
+  compressor.submit(page.bytes, page.runs);
+  const CompressedPage stored = compressor.take();
+  EXPECT_EQ(stored.codec, Codec::zstd);
+  EXPECT_LT(stored.stored.size(), modelled);
 }
 
 // ---- The models by themselves
