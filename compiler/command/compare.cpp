@@ -98,6 +98,10 @@ int runCompare(const Arguments& arguments) {
   if (!pack) return reportIssue(arguments.pack, pack.error());
   const compiler::ImportOptions options = importOptions(arguments.import);
   const compiler::Plan plan = compiler::planInputs(arguments.inputs, options, printWarning);
+  if (!plan.effects.empty()) {
+    throw compiler::Error(compiler::Fault::commandLine,
+                          plan.effects.front().file + ": compare measures volumes; it cannot measure effects");
+  }
   std::optional<format::TempFile> file;  // opened before the work, so that a bad path costs no time
   std::optional<ReportCollector> report;
   if (!arguments.report.empty()) {

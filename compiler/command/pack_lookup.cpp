@@ -11,6 +11,7 @@ namespace billow::command {
 tl::expected<std::uint32_t, std::string> findVolume(const format::Pack& pack, const std::string& name) {
   const auto volumes = pack.volumes();
   if (name.empty() && volumes.size() == 1) return 0;
+  if (volumes.empty()) return tl::unexpected(std::string("the pack has no volumes, only effects or nothing"));
   std::vector<std::string_view> names;
   for (std::uint32_t i = 0; i < volumes.size(); ++i) {
     names.push_back(pack.string(volumes[i].name));

@@ -65,6 +65,18 @@ TEST(CommandEffect, ExtractSaysWhatItNeeds) {
   EXPECT_NE(late.err.find("is empty 0 s after"), std::string::npos) << late.err;
 }
 
+TEST(CommandEffect, WhatIsForVolumesSaysSo) {
+  const TempFolder folder;
+  const std::string pack = folder / "e.blw";
+  ASSERT_EQ(shell("$BILLOW compile " + kSamples + "steam_jet.effect.json -o " + pack).code, 0);
+  const auto compared = shell("$BILLOW compare " + pack + " " + kSamples + "steam_jet.effect.json");
+  EXPECT_EQ(compared.code, 1);
+  EXPECT_NE(compared.err.find("cannot measure effects"), std::string::npos) << compared.err;
+  const auto frame = shell("$BILLOW extract " + pack + " --frame 0 -o " + (folder / "e.vdb"));
+  EXPECT_EQ(frame.code, 1);
+  EXPECT_NE(frame.err.find("no volumes"), std::string::npos) << frame.err;
+}
+
 TEST(CommandEffect, ABadDescriptionIsInvalidInput) {
   const TempFolder folder;
   const std::string file = folder / "bad.effect.json";
