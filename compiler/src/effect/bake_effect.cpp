@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
+#include <span>
 #include <utility>
 
 #include "effect/noise_map.h"
@@ -120,7 +120,9 @@ class Baker {
   // Where these records stand in the table, one after another; they are appended where they don't.
   template <class T>
   static std::uint32_t shared(std::vector<T>& table, const std::vector<T>& records) {
-    const auto equal = [](const T& a, const T& b) { return std::memcmp(&a, &b, sizeof(T)) == 0; };
+    const auto equal = [](const T& a, const T& b) {
+      return std::ranges::equal(std::as_bytes(std::span(&a, 1)), std::as_bytes(std::span(&b, 1)));
+    };
     auto at = std::search(table.begin(), table.end(), records.begin(), records.end(), equal);
     const auto first = static_cast<std::uint32_t>(at - table.begin());
     if (at == table.end()) table.insert(table.end(), records.begin(), records.end());
