@@ -5,6 +5,8 @@
 #include <limits>
 #include <numeric>
 
+#include "billow/format/bfloat16.h"
+
 namespace billow::format::page_coder {
 namespace {
 
@@ -17,11 +19,10 @@ std::uint32_t encodingKind(std::uint32_t encoding) {
   return indexBits(encoding) > 0 && !isLocal(encoding) ? 1 : 2;
 }
 
-// The 16 high bits of a binary32, rounded to nearest, ties to even; 0 for what is not finite.
-std::uint32_t upperHalf(double value) {
+// 0 for what is not finite.
+std::uint32_t finiteBfloat16(double value) {
   if (!(std::abs(value) <= static_cast<double>(std::numeric_limits<float>::max()))) return 0;
-  const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(value));
-  return (bits + 0x7fff + (bits >> 16 & 1)) >> 16 & 0xffff;
+  return toBfloat16(static_cast<float>(value));
 }
 
 std::uint32_t zigzag(std::uint32_t difference) {
@@ -265,7 +266,8 @@ void PageModel::codeMeans(Coder& coder) {
                        static_cast<double>(texelSums_[i]) * static_cast<double>(node.scale) +
                        (static_cast<double>(kBrickVoxels) - active) * background;
     const auto bits = std::bit_cast<std::uint32_t>(node.mean);
-    const std::uint32_t upper = codeDifference(coder, mean_, meanBits_, 16, upperHalf(sum / kBrickVoxels), bits >> 16);
+    const std::uint32_t upper =
+        codeDifference(coder, mean_, meanBits_, 16, finiteBfloat16(sum / kBrickVoxels), bits >> 16);
     std::uint32_t lower = 0;
     if (coder.bit(meanRest_, (bits & 0xffff) != 0)) lower = coder.bits(16, bits & 0xffff);
     node.mean = std::bit_cast<float>(upper << 16 | lower);
