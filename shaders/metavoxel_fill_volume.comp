@@ -19,6 +19,11 @@ vec3 indexAlong(uint g, vec3 way) {
 // Samples along an axis: a voxel of the space that spans several of the grid's takes their mean.
 int samplesAlong(vec3 step) { return clamp(int(ceil(length(step) - 0.25)), 1, kMostSamples); }
 
+float readGrid(uint g, vec3 world) {
+  const vec3 offset = vec3(params.grids[g].toIndex[0].w, params.grids[g].toIndex[1].w, params.grids[g].toIndex[2].w);
+  return sampleGrid(g, indexAlong(g, world) + offset, kFilterTrilinear);
+}
+
 Texel sampleVolume(vec3 voxel) {
   const vec3 world = worldOf(voxel);
   ivec3 count = ivec3(1);
@@ -28,25 +33,28 @@ Texel sampleVolume(vec3 voxel) {
       count[axis] = max(count[axis], samplesAlong(indexAlong(g, meta.toWorld[axis].xyz)));
     }
   }
-  float extinction = 0.0;
+  // What fire gives off is no linear function of its grids: the mean over a voxel is not what its middle gives. Smoke's
+  // extinction is linear, and one sample is sharper.
+  const bool burning = hasGrid(kTemperatureSlot) || hasGrid(kFlamesSlot);
+  const bool sharp = hasGrid(kExtinctionSlot) && count == ivec3(1);
+  if (burning) count = max(count, 2);
+  const int samples = count.x * count.y * count.z;
+  float extinction = sharp ? extinctionOf(readGrid(kExtinctionSlot, world)) * float(samples) : 0.0;
   vec3 emission = vec3(0.0);
-  for (int i = 0; i < count.x * count.y * count.z; ++i) {
+  for (int i = 0; i < samples && (burning || !sharp); ++i) {
     const ivec3 at = ivec3(i % count.x, i / count.x % count.y, i / (count.x * count.y));
     const vec3 shift = (vec3(at) + 0.5) / vec3(count) - 0.5;
     const vec3 place =
         world + meta.toWorld[0].xyz * shift.x + meta.toWorld[1].xyz * shift.y + meta.toWorld[2].xyz * shift.z;
     float value[3];
     for (uint g = 0u; g < kGridSlots; ++g) {
-      const vec3 offset =
-          vec3(params.grids[g].toIndex[0].w, params.grids[g].toIndex[1].w, params.grids[g].toIndex[2].w);
-      value[g] = hasGrid(g) ? sampleGrid(g, indexAlong(g, place) + offset, kFilterTrilinear) : 0.0;
+      const bool read = hasGrid(g) && !(sharp && g == kExtinctionSlot);
+      value[g] = read ? readGrid(g, place) : 0.0;
     }
-    extinction += extinctionOf(value[extinctionSlot()]);
-    if (hasGrid(kTemperatureSlot) || hasGrid(kFlamesSlot)) {
-      emission += emissionOf(value[kTemperatureSlot], value[kFlamesSlot]);
-    }
+    if (!sharp) extinction += extinctionOf(value[extinctionSlot()]);
+    if (burning) emission += emissionOf(value[kTemperatureSlot], value[kFlamesSlot]);
   }
-  const float share = meta.eye.w / float(count.x * count.y * count.z);
+  const float share = meta.eye.w / float(samples);
   return Texel(extinction > 0.0 ? params.albedo.rgb : vec3(0.0), extinction * share, emission * share);
 }
 

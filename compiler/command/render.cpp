@@ -122,8 +122,8 @@ struct Painter {
   }
 };
 
-// `box` and `voxelSize` are those of what metavoxels will hold.
-Checked<Painter> makePainter(const Job& job, const runtime::WorldBox& box, double voxelSize) {
+// `box` and `lattice` are those of what metavoxels will hold.
+Checked<Painter> makePainter(const Job& job, const runtime::WorldBox& box, VoxelLattice lattice) {
   Painter painter;
   auto gpu = headless::Headless::create({.device = job.request.device});
   if (!gpu) return tl::unexpected(toRefusal(gpu.error(), job.request.pack));
@@ -132,9 +132,9 @@ Checked<Painter> makePainter(const Job& job, const runtime::WorldBox& box, doubl
   if (!renderer) return tl::unexpected(toRefusal(renderer.error(), job.request.pack));
   painter.renderer = std::move(*renderer);
   if (job.request.method == Method::direct) return painter;
+  if (job.request.voxelSize) lattice.edge = *job.request.voxelSize;
   // The other half is for the frame and its staging memory.
-  auto metavoxels = MetavoxelPainter::make(*painter.renderer, job.pack, box, job.request.voxelSize.value_or(voxelSize),
-                                           job.request.gpuBudget / 2);
+  auto metavoxels = MetavoxelPainter::make(*painter.renderer, job.pack, box, lattice, job.request.gpuBudget / 2);
   if (!metavoxels) return tl::unexpected(toRefusal(metavoxels.error(), job.request.pack));
   painter.metavoxels = std::move(*metavoxels);
   return painter;
@@ -167,7 +167,7 @@ Checked<void> renderFrames(const Job& job) {
     addParticles(particles.back(), stage.box);
   }
   const runtime::DrawInfo draw = setUp(job.request, stage, *look, job.png);
-  auto painter = makePainter(job, stage.box, finestVoxel(job.pack, job.record(), job.grids));
+  auto painter = makePainter(job, stage.box, finestVoxels(job.pack, job.record(), job.grids));
   if (!painter) return tl::unexpected(painter.error());
   // No prepare(): it builds the pipelines of every frame ahead, so that none is late. Here nobody waits for a frame,
   // and those that the chosen frames need are built when they are met.
@@ -192,7 +192,7 @@ Checked<void> renderEffects(const Job& job) {
   runtime::Look look;
   look.scatteringOrders = 4;
   const runtime::DrawInfo draw = setUp(job.request, stage, look, job.png);
-  auto painter = makePainter(job, stage.box, 0);
+  auto painter = makePainter(job, stage.box, {});
   if (!painter) return tl::unexpected(painter.error());
   return save(job, painter->render(draw, particles), job.request.output);
 }

@@ -64,22 +64,24 @@ void addParticles(const Particles& particles, runtime::WorldBox& box) {
   }
 }
 
-double finestVoxel(const format::Pack& pack, const format::VolumeRecord& volume, const runtime::GridChoice& grids) {
-  double finest = 0;
+VoxelLattice finestVoxels(const format::Pack& pack, const format::VolumeRecord& volume,
+                          const runtime::GridChoice& grids) {
+  VoxelLattice finest;
   for (std::uint32_t frame = 0; frame < volume.frameCount; ++frame) {
     for (const std::uint32_t grid : {grids.extinction, grids.temperature, grids.flames}) {
       if (grid == format::kNone) continue;
       const format::GridFrame& record = pack.gridFrame(volume, frame, grid);
       if ((record.flags & format::kGridPresent) == 0) continue;
       const double edge = std::cbrt(std::abs(format::determinant(record.indexToWorld)));
-      finest = finest > 0 ? std::min(finest, edge) : edge;
+      if (finest.edge > 0 && finest.edge <= edge) continue;
+      finest = {edge, {record.indexToWorld[3], record.indexToWorld[7], record.indexToWorld[11]}};
     }
   }
   return finest;
 }
 
 runtime::Result<MetavoxelPainter> MetavoxelPainter::make(runtime::Renderer& renderer, const format::Pack& pack,
-                                                         const runtime::WorldBox& box, double voxelSize,
+                                                         const runtime::WorldBox& box, const VoxelLattice& lattice,
                                                          std::uint64_t memoryBudget) {
   double diagonal = 0, longest = 0;
   MetavoxelPainter painter;
@@ -92,8 +94,9 @@ runtime::Result<MetavoxelPainter> MetavoxelPainter::make(runtime::Renderer& rend
   diagonal = std::sqrt(diagonal);
   // One metavoxel is kept for the half voxel by which the space may move, and for filtering at its faces.
   const double finest = diagonal / ((kMostAlong - 1) * kInner);
-  const double voxel = std::max(voxelSize > 0 ? voxelSize : longest / kDefaultVoxels, finest);
+  const double voxel = std::max(lattice.edge > 0 ? lattice.edge : longest / kDefaultVoxels, finest);
   painter.voxelSize_ = static_cast<float>(voxel);
+  painter.anchor_ = lattice.anchor;
   painter.mostEntries_ = kMostEntries;
   const double along = std::ceil(diagonal / voxel / kInner) + 1;
   auto made = runtime::Metavoxels::create(
@@ -120,6 +123,7 @@ runtime::Result<headless::Picture> MetavoxelPainter::render(headless::Headless& 
   info.scattering = {draw.look.anisotropy, draw.look.ambient, draw.look.scatteringOrders};
   if (draw.quality.shadows == runtime::Filter::none) info.lightExtinction = {0, 0, 0};
   info.center = center_;
+  info.anchor = anchor_;
   info.voxelSize = voxelSize_;
   if (draw.frame != nullptr) info.volumes = {&volume, 1};
   info.particles = particles;

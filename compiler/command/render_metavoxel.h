@@ -23,14 +23,20 @@ Particles particlesOf(const format::Pack& pack, const std::vector<std::uint32_t>
 // The box grown to hold the particles' bounding spheres.
 void addParticles(const Particles& particles, runtime::WorldBox& box);
 
-// Edge of the smallest voxel of the grids, world units; 0 where the volume has none of them.
-double finestVoxel(const format::Pack& pack, const format::VolumeRecord& volume, const runtime::GridChoice& grids);
+// The smallest voxels of the grids: their edge, world units (0 where there is no grid), and the centre of one.
+struct VoxelLattice {
+  double edge = 0;
+  std::array<double, 3> anchor{};
+};
+VoxelLattice finestVoxels(const format::Pack& pack, const format::VolumeRecord& volume,
+                          const runtime::GridChoice& grids);
 
 class MetavoxelPainter {
  public:
-  // A space that holds `box` from any direction, its voxels at least `voxelSize` (0: a 256th of the box).
+  // A space that holds `box` from any direction, its voxels those of the lattice or, where that is too fine, larger
+  // (edge 0: a 256th of the box).
   static runtime::Result<MetavoxelPainter> make(runtime::Renderer& renderer, const format::Pack& pack,
-                                                const runtime::WorldBox& box, double voxelSize,
+                                                const runtime::WorldBox& box, const VoxelLattice& lattice,
                                                 std::uint64_t memoryBudget);
 
   // `draw` as for the direct method; its frame may be null. Without shadows light passes unhindered.
@@ -39,7 +45,7 @@ class MetavoxelPainter {
 
  private:
   std::unique_ptr<runtime::Metavoxels> metavoxels_;
-  std::array<double, 3> center_{};
+  std::array<double, 3> center_{}, anchor_{};
   float voxelSize_ = 0;
   std::uint32_t mostEntries_ = 0;
 };

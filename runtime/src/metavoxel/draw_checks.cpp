@@ -15,8 +15,8 @@ Result<void> checkDraw(const MetavoxelDraw& draw, const MetavoxelConfig& config)
   if (draw.color == VK_NULL_HANDLE || draw.depth == VK_NULL_HANDLE) return badArgument("color, depth");
   if (!positive(draw.voxelSize)) return badArgument("voxelSize");
   if (!(std::isfinite(draw.step) && draw.step >= kLeastStep)) return badArgument("step");
-  for (const double at : draw.center) {
-    if (!std::isfinite(at)) return badArgument("center");
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (!std::isfinite(draw.center[i]) || !std::isfinite(draw.anchor[i])) return badArgument("center, anchor");
   }
   for (const float share : draw.lightExtinction) {
     if (!(share >= 0) || !std::isfinite(share)) return badArgument("lightExtinction");

@@ -141,8 +141,9 @@ Space spaceOf(const MetavoxelDraw& draw, const MetavoxelSizes& sizes) {
   for (const Vec3d& axis : space.axes) {
     // Voxel k has its centre at middle - half + k + 1/2.
     const double shift = space.half - 0.5;
-    const double middle = std::round(dot(axis, draw.center) / space.voxel - shift) + shift;
-    for (std::size_t i = 0; i < 3; ++i) space.center[i] += axis[i] * middle * space.voxel;
+    const double anchor = dot(axis, draw.anchor);
+    const double middle = std::round((dot(axis, draw.center) - anchor) / space.voxel - shift) + shift;
+    for (std::size_t i = 0; i < 3; ++i) space.center[i] += axis[i] * (anchor + middle * space.voxel);
   }
   return space;
 }

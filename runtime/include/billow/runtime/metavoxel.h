@@ -62,10 +62,13 @@ struct MetavoxelDraw {
   // What red, green and blue sunlight lose, as multiples of the extinction, >= 0; {1, 1, 1} is white light.
   std::array<float, 3> lightExtinction{1, 1, 1};
   // Middle of the space. It is moved by up to half a voxel an axis, so that the centres of voxels lie at whole
-  // multiples of voxelSize along the space's axes from the world's origin: a space that follows a camera does not swim.
-  // The x and y axes are those of the world where the sun stands on an axis of the world.
+  // multiples of voxelSize along the space's axes from `anchor`: a space that follows a camera does not swim, and where
+  // the sun stands on an axis of the world, which is then the space's too, the voxels of a volume that is anchored at
+  // one of them are the space's.
   std::array<double, 3> center{0, 0, 0};
-  float voxelSize = 0.1f;  // world units, > 0
+  std::array<double, 3> anchor{0, 0, 0};
+  // World units, > 0. Fire, whose emission changes steeply from voxel to voxel, looks best at half its voxels' size.
+  float voxelSize = 0.1f;
   std::span<const MetavoxelVolume> volumes = {};
   std::span<const format::Particle> particles = {};  // those of radius 0 are not there
   float step = 1;       // of the march, in voxels along the direction of view, >= kLeastStep
