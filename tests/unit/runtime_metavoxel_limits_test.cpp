@@ -49,7 +49,8 @@ TEST_F(MetavoxelLimits, BudgetIsKeptAndGivenBack) {
     config.memoryBudget = budget;
     const auto metavoxels = make(config);
     EXPECT_LE(metavoxels->bytesAllocated(), budget);
-    EXPECT_GT(metavoxels->bytesAllocated(), budget * 3 / 4) << "it is used";
+    // GPUs round images up, and the pool grows by whole layers of it.
+    EXPECT_GT(metavoxels->bytesAllocated(), budget / 2) << "it is used";
     EXPECT_EQ(renderer_->bytesInUse() - before, metavoxels->bytesAllocated());
   }
   EXPECT_EQ(renderer_->bytesInUse(), before);
