@@ -134,11 +134,12 @@ TEST_F(Report, TheMixIsNoDearerThanAnyEncodingAlone) {
   const double mix = std::stod(bits.at("mix of --psnr").get<std::string>());
   std::size_t reached = 0;
   for (const auto& [name, text] : bits.items()) {
-    if (name == "pack" || name == "local" || text == "out of reach") continue;  // --psnr takes no local bricks
+    if (name == "pack" || name == "mix of --psnr" || text == "out of reach") continue;
+    if (name == "local") continue;  // --psnr takes none
     EXPECT_LE(mix, std::stod(text.get<std::string>())) << name;
     ++reached;
   }
-  EXPECT_GE(reached, 3u);
+  EXPECT_GE(reached, 1u) << "uniform bricks reach any";
   EXPECT_EQ(bits.at("constant"), "out of reach");
   // The compiler's choice is this very mix, but for its limit on single voxels and what is shared.
   EXPECT_NEAR(std::stod(bits.at("pack").get<std::string>()), mix, 0.15 * mix);
