@@ -27,15 +27,30 @@ struct Sums {
 uint added(uint a, uint b) { return min(a + b, kMostUnits); }
 uint units(float amount, float scale) { return uint(min(amount * scale, 2147483520.0) + 0.5); }
 
-void add(uint number, vec3 place, inout Sums sums) {
+void add(Particle particle, ParticleMaterial material, vec3 apart, inout Sums sums) {
   Matter matter;
-  if (!matterAt(number, place, matter)) return;
+  if (!matterAt(particle, material, apart, matter)) return;
   const float edge = meta.eye.w;
   sums.extinction = added(sums.extinction, units(matter.extinction * edge, kExtinctionUnits));
   for (int i = 0; i < 3; ++i) {
     sums.emission[i] = added(sums.emission[i], units(matter.emission[i] * edge, kEmissionUnits));
   }
   sums.albedo = max(sums.albedo, matter.diffuse);
+}
+
+// A particle into both texels of the thread, `places` relative to the space's centre. Most of it is read only where its
+// bounding sphere is.
+void addBoth(uint number, vec3 places[2], inout Sums sums[2]) {
+  Particles particles = Particles(meta.entries.zw);
+  const vec3 center = vectorOf(particles.items[number].center);
+  const float radius = particles.items[number].radius;
+  const vec3 apart[2] = vec3[2](places[0] - center, places[1] - center);
+  const bvec2 inside = lessThan(vec2(dot(apart[0], apart[0]), dot(apart[1], apart[1])), vec2(radius * radius));
+  if (!any(inside)) return;
+  const Particle particle = particles.items[number];
+  const ParticleMaterial material = Materials(meta.tables.xy).items[particle.material];
+  if (inside.x) add(particle, material, apart[0], sums[0]);
+  if (inside.y) add(particle, material, apart[1], sums[1]);
 }
 
 void collect(Block block, uvec2 list, uint first) {
@@ -69,10 +84,7 @@ void main() {
   for (uint at = 0u; at < list.y; at += kBatch) {
     collect(block, list, at);
     some = some || nearCount != 0u;
-    for (uint j = 0u; j < nearCount; ++j) {
-      add(near[j], places[0], sums[0]);
-      add(near[j], places[1], sums[1]);
-    }
+    for (uint j = 0u; j < nearCount; ++j) addBoth(near[j], places, sums);
   }
   if (!some && !first) return;
   Texel values[2];

@@ -7,9 +7,9 @@
 
 #include "medium.glsl"
 #include "metavoxel_block.glsl"
+#include "metavoxel_volume.glsl"
 
 const int kMostSamples = 4;  // an axis
-
 
 vec3 indexAlong(uint g, vec3 way) {
   return vec3(dot(params.grids[g].toIndex[0].xyz, way), dot(params.grids[g].toIndex[1].xyz, way),
@@ -63,7 +63,13 @@ void main() {
   const uint volumes = wordOf(block.number) >> kVolumeBit;
   if ((volumes >> pass.volume & 1u) == 0u) return;
   const bool first = (volumes & ((1u << pass.volume) - 1u)) == 0u;
+  const vec3 middle = texelVoxel(block.cell, block.texel);
+  const bool some = volumeHas(middle - 0.5, middle + float(kSubBlock) - 0.5);
+  if (!some && !first) return;
   Texel values[2];
-  for (uint i = 0u; i < 2u; ++i) values[i] = sampleVolume(texelVoxel(block.cell, texelOf(block, i)));
+  for (uint i = 0u; i < 2u; ++i) {
+    values[i] = Texel(vec3(0.0), 0.0, vec3(0.0));
+    if (some) values[i] = sampleVolume(texelVoxel(block.cell, texelOf(block, i)));
+  }
   storeBlock(block, values, first);
 }

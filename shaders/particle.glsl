@@ -75,15 +75,9 @@ struct Matter {  // per world unit
   vec3 emission;
 };
 
-// False where particle `number` has no density. `place` is relative to the centre of the space.
-bool matterAt(uint number, vec3 place, out Matter matter) {
+// False where the particle has no density. `apart` is the way from its centre, inside of the bounding sphere.
+bool matterAt(Particle particle, ParticleMaterial material, vec3 apart, out Matter matter) {
   matter = Matter(0.0, vec3(0.0), vec3(0.0));
-  Particles particles = Particles(meta.entries.zw);
-  const vec3 apart = place - vectorOf(particles.items[number].center);
-  const float radius = particles.items[number].radius;
-  if (dot(apart, apart) >= radius * radius) return false;
-  // The rest is read only where the bounding sphere is.
-  const Particle particle = particles.items[number];
   const vec4 turn = vec4(-particle.rotation[0], -particle.rotation[1], -particle.rotation[2], particle.rotation[3]);
   const vec3 q = rotated(turn, apart);
   const float s = shareOf(particle, q);
@@ -91,7 +85,6 @@ bool matterAt(uint number, vec3 place, out Matter matter) {
   const float m = particle.map == kNoMap ? 1.0 : sampleCube(particle.map, q);
   const float r = s / (1.0 - particle.displacement * (1.0 - m));
   if (!(r < 1.0)) return false;
-  const ParticleMaterial material = Materials(meta.tables.xy).items[particle.material];
   float density = profileOf(material, r) * clamp((1.0 - r) / material.softness, 0.0, 1.0);
   if (material.erosion > 0.0) {
     const vec3 at = q * (material.erosionFrequency / particle.radius);

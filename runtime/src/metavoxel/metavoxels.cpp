@@ -85,7 +85,7 @@ class MetavoxelsImpl final : public Metavoxels {
   struct Steps {  // a draw's pipelines and volumes, all made before anything is recorded
     Space space;
     std::vector<VolumeSteps> volumes;
-    VkPipeline reset, binCount, binWrite, plan, rank, fill, sum, light, shadow, march, finish;
+    VkPipeline clear, reset, binCount, binWrite, plan, rank, fill, sum, light, shadow, march, finish;
   };
 
   Result<Steps> prepare(const MetavoxelDraw& draw) {
@@ -93,7 +93,8 @@ class MetavoxelsImpl final : public Metavoxels {
     steps.space = spaceOf(draw, resources_.sizes());
     const bool half = draw.colorFormat == ColorFormat::half;
     using enum MetavoxelPass;
-    const std::pair<MetavoxelPass, VkPipeline*> wanted[] = {{reset, &steps.reset},
+    const std::pair<MetavoxelPass, VkPipeline*> wanted[] = {{clear, &steps.clear},
+                                                            {reset, &steps.reset},
                                                             {binCount, &steps.binCount},
                                                             {binWrite, &steps.binWrite},
                                                             {plan, &steps.plan},
@@ -206,9 +207,8 @@ class MetavoxelsImpl final : public Metavoxels {
     indirect(commands, steps.reset, {}, regions.counters + offsetof(gpu::MetavoxelCounters, reset));
     barrier(commands);
     device_.api.vkCmdFillBuffer(commands, arrays, regions.counters, sizeof(gpu::MetavoxelCounters), 0);
-    const VkClearColorValue none{};
-    const VkImageSubresourceRange whole{VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
-    device_.api.vkCmdClearColorImage(commands, resources_.shadow.handle(), VK_IMAGE_LAYOUT_GENERAL, &none, 1, &whole);
+    const std::uint32_t groups = (resources_.sizes().shadowEdge() + 15) / 16;
+    dispatch(commands, steps.clear, {}, {groups, groups, 1});
     if (!draw.particles.empty()) {
       const VkBufferCopy copy{resources_.uploadOf(next_).particles, regions.particles, draw.particles.size_bytes()};
       device_.api.vkCmdCopyBuffer(commands, resources_.uploads.handle(), arrays, 1, &copy);

@@ -13,12 +13,12 @@ using Code = std::span<const std::uint32_t>;
 
 // In the order of MetavoxelPass.
 Code codeOf(MetavoxelPass pass) {
-  static const Code codes[] = {
-      spirv::kMetavoxelReset,       spirv::kMetavoxelBin,        spirv::kMetavoxelBin,
-      spirv::kMetavoxelBinVolume,   spirv::kMetavoxelPlan,       spirv::kMetavoxelRank,
-      spirv::kMetavoxelFill,        spirv::kMetavoxelFillVolume, spirv::kMetavoxelSum,
-      spirv::kMetavoxelLight,       spirv::kMetavoxelShadow,     spirv::kMetavoxelMarchHalf,
-      spirv::kMetavoxelMarchSingle, spirv::kMetavoxelFinishHalf, spirv::kMetavoxelFinishSingle};
+  static const Code codes[] = {spirv::kMetavoxelClear,       spirv::kMetavoxelReset,       spirv::kMetavoxelBin,
+                               spirv::kMetavoxelBin,         spirv::kMetavoxelBinVolume,   spirv::kMetavoxelPlan,
+                               spirv::kMetavoxelRank,        spirv::kMetavoxelFill,        spirv::kMetavoxelFillVolume,
+                               spirv::kMetavoxelSum,         spirv::kMetavoxelLight,       spirv::kMetavoxelShadow,
+                               spirv::kMetavoxelMarchHalf,   spirv::kMetavoxelMarchSingle, spirv::kMetavoxelFinishHalf,
+                               spirv::kMetavoxelFinishSingle};
   return codes[static_cast<std::size_t>(pass)];
 }
 

@@ -11,6 +11,7 @@
 namespace billow::runtime {
 
 enum class MetavoxelPass : std::uint32_t {
+  clear,
   reset,
   binCount,
   binWrite,
