@@ -16,7 +16,7 @@ timed() {  # LOG COMMAND...: appends "seconds kilobytes"
 median() { sort -n "$1" | awk '{v[NR]=$1; m=($2>m)?$2:m} END {printf "%.3f %.0f", v[int((NR+1)/2)], m/1024}'; }
 
 for _ in $(seq "$runs"); do
-  timed "$work/billow" "$billow" compile "$@" -o "$work/out.blw"
+  timed "$work/billow" "$billow" compile "$@" --psnr 45 -o "$work/out.blw"
   timed "$work/nanovdb" nanovdb_convert -f --fpN -b "$@" "$work/out.nvdb"
 done
 read -r b bm <<<"$(median "$work/billow")"
