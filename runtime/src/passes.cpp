@@ -4,6 +4,7 @@
 #include <cstring>
 #include <span>
 
+#include "compute_pipeline.h"
 #include "spirv.h"
 
 namespace billow::runtime {
@@ -105,35 +106,10 @@ Result<VkPipeline> Passes::pipeline(const PassKey& key) {
   // The place first, so that no pipeline is lost where there is no memory for it.
   VkPipeline& place = pipelines_[key];
   if (place != VK_NULL_HANDLE) return place;
-  auto made = compile(key);
+  const std::uint32_t constants[] = {key.index, key.filter, key.shadow, key.grids};
+  auto made = makeComputePipeline(device_, pipelineLayout_, spirvOf(key.shader), constants);
   if (made) place = *made;
   return made;
-}
-
-Result<VkPipeline> Passes::compile(const PassKey& key) {
-  const VkDevice device = device_.host.device;
-  const std::span<const std::uint32_t> code = spirvOf(key.shader);
-  auto moduleInfo = begin<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
-  moduleInfo.codeSize = code.size_bytes();
-  moduleInfo.pCode = code.data();
-  VkShaderModule module = VK_NULL_HANDLE;
-  VkResult result = device_.api.vkCreateShaderModule(device, &moduleInfo, nullptr, &module);
-  if (result != VK_SUCCESS) return vulkanError("vkCreateShaderModule", result);
-  const std::uint32_t constants[] = {key.index, key.filter, key.shadow, key.grids};
-  const VkSpecializationMapEntry entries[] = {{0, 0, 4}, {1, 4, 4}, {2, 8, 4}, {3, 12, 4}};
-  const VkSpecializationInfo specialization{4, entries, sizeof(constants), constants};
-  auto info = begin<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
-  info.stage = begin<VkPipelineShaderStageCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO);
-  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
-  info.stage.module = module;
-  info.stage.pName = "main";
-  info.stage.pSpecializationInfo = &specialization;
-  info.layout = pipelineLayout_;
-  VkPipeline pipeline = VK_NULL_HANDLE;
-  result = device_.api.vkCreateComputePipelines(device, device_.host.pipelineCache, 1, &info, nullptr, &pipeline);
-  device_.api.vkDestroyShaderModule(device, module, nullptr);
-  if (result != VK_SUCCESS) return vulkanError("vkCreateComputePipelines", result);
-  return pipeline;
 }
 
 void Passes::bind(VkCommandBuffer commands, const ResidentFrame& frame, const gpu::MarchParams& params,

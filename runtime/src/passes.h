@@ -46,7 +46,6 @@ class Passes {
  private:
   Result<void> createLayouts();
   Result<void> createSets();
-  Result<VkPipeline> compile(const PassKey& key);
 
   Device& device_;
   std::uint32_t inFlight_;

@@ -9,12 +9,15 @@
 #include <string>
 #include <vector>
 
+#include "bench_failure.h"
 #include "billow/headless/headless.h"
 #include "billow/runtime/look.h"
 
 namespace {
 
 using namespace billow;
+using bench::fail;
+using bench::valueOf;
 using runtime::Filter;
 using runtime::Index;
 
@@ -31,22 +34,6 @@ struct Variant {
   Filter filter;
   Filter shadows;
 };
-
-[[noreturn]] void fail(const std::string& message) {
-  fmt::print(stderr, "billow_march_bench: {}\n", message);
-  std::exit(1);
-}
-
-template <class Expected>
-auto valueOf(Expected result) {
-  if (!result) {
-    if constexpr (requires { result.error().message; })
-      fail(result.error().message);
-    else
-      fail(toString(result.error()));
-  }
-  return std::move(*result);
-}
 
 Options parse(int argc, char** argv) {
   Options options;

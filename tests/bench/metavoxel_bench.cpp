@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "bench_failure.h"
 #include "billow/format/noise.h"
 #include "billow/headless/headless.h"
 #include "billow/runtime/look.h"
@@ -19,6 +20,8 @@
 namespace {
 
 using namespace billow;
+using bench::fail;
+using bench::valueOf;
 
 struct Options {
   std::string pack;
@@ -51,22 +54,6 @@ constexpr Scene kScenes[] = {
     {"the same, 4096^3", 1000, true, 128, 200, 3072 * kMiB},
     {"1000 and volume, 128 MB", 1000, true, 34, 300, 128 * kMiB},
 };
-
-[[noreturn]] void fail(const std::string& message) {
-  fmt::print(stderr, "billow_metavoxel_bench: {}\n", message);
-  std::exit(1);
-}
-
-template <class Expected>
-auto valueOf(Expected result) {
-  if (!result) {
-    if constexpr (requires { result.error().message; })
-      fail(result.error().message);
-    else
-      fail(toString(result.error()));
-  }
-  return std::move(*result);
-}
 
 Options parse(int argc, char** argv) {
   Options options;

@@ -5,12 +5,7 @@
 #include "billow/format/noise.h"
 
 namespace billow::compiler {
-namespace {
 
-struct Lattice {
-  int at[3];
-  double share[3];
-};
 Lattice latticeOf(const std::array<double, 3>& p) {
   Lattice lattice{};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -20,6 +15,8 @@ Lattice latticeOf(const std::array<double, 3>& p) {
   }
   return lattice;
 }
+
+namespace {
 
 // The slope at a lattice point times the way from it: one of the twelve directions to the edges of a cube.
 double slope(std::uint32_t hash, double x, double y, double z) {

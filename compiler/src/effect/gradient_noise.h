@@ -7,6 +7,13 @@
 
 namespace billow::compiler {
 
+// The lattice cell of a point, whose coordinates an int holds, and where in it the point lies, each share in [0, 1).
+struct Lattice {
+  int at[3];
+  double share[3];
+};
+Lattice latticeOf(const std::array<double, 3>& p);
+
 // Perlin's noise (2002, "Improving Noise"), about [-1, 1]. Coordinates below 2^31 in magnitude.
 double gradientNoise(const std::array<double, 3>& p, std::uint32_t seed);
 

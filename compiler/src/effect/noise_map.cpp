@@ -20,20 +20,6 @@ constexpr std::uint32_t kEdge = format::kCubeEdge;
 constexpr std::size_t kFaceTexels = std::size_t{kEdge} * kEdge;
 constexpr std::size_t kMapTexels = kFaceTexels * format::kCubeFaces;
 
-struct Lattice {
-  int at[3];
-  double share[3];
-};
-Lattice latticeOf(const Vec3& p) {
-  Lattice lattice{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    const double whole = std::floor(p[i]);
-    lattice.at[i] = static_cast<int>(whole);
-    lattice.share[i] = p[i] - whole;
-  }
-  return lattice;
-}
-
 // The distance to the nearest of one random point in each lattice cell (Worley 1996), at most about 1.
 double cellNoise(const Vec3& p, std::uint32_t seed) {
   const Lattice l = latticeOf(p);

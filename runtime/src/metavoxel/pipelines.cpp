@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <span>
 
+#include "compute_pipeline.h"
 #include "passes.h"
 #include "spirv.h"
 
@@ -124,37 +125,11 @@ Result<VkPipeline> MetavoxelPipelines::pipeline(MetavoxelPass pass, const FrameI
   // The place first, so that no pipeline is lost where there is no memory for it.
   VkPipeline& place = pipelines_[key];
   if (place != VK_NULL_HANDLE) return place;
-  auto made = compile(key);
+  const std::uint32_t constants[] = {grids.index, gpu::kFilterTrilinear, gpu::kFilterNone, grids.grids,
+                                     pass == MetavoxelPass::binWrite ? 1u : 0u};
+  auto made = makeComputePipeline(device_, layout_, codeOf(pass), constants);
   if (made) place = *made;
   return made;
-}
-
-Result<VkPipeline> MetavoxelPipelines::compile(const Key& key) {
-  const auto [pass, index, grids] = key;
-  const VkDevice device = device_.host.device;
-  const Code code = codeOf(pass);
-  auto moduleInfo = begin<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
-  moduleInfo.codeSize = code.size_bytes();
-  moduleInfo.pCode = code.data();
-  VkShaderModule module = VK_NULL_HANDLE;
-  VkResult result = device_.api.vkCreateShaderModule(device, &moduleInfo, nullptr, &module);
-  if (result != VK_SUCCESS) return vulkanError("vkCreateShaderModule", result);
-  const std::uint32_t constants[] = {index, gpu::kFilterTrilinear, gpu::kFilterNone, grids,
-                                     pass == MetavoxelPass::binWrite ? 1u : 0u};
-  const VkSpecializationMapEntry entries[] = {{0, 0, 4}, {1, 4, 4}, {2, 8, 4}, {3, 12, 4}, {4, 16, 4}};
-  const VkSpecializationInfo specialization{5, entries, sizeof(constants), constants};
-  auto info = begin<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
-  info.stage = begin<VkPipelineShaderStageCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO);
-  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
-  info.stage.module = module;
-  info.stage.pName = "main";
-  info.stage.pSpecializationInfo = &specialization;
-  info.layout = layout_;
-  VkPipeline pipeline = VK_NULL_HANDLE;
-  result = device_.api.vkCreateComputePipelines(device, device_.host.pipelineCache, 1, &info, nullptr, &pipeline);
-  device_.api.vkDestroyShaderModule(device, module, nullptr);
-  if (result != VK_SUCCESS) return vulkanError("vkCreateComputePipelines", result);
-  return pipeline;
 }
 
 void MetavoxelPipelines::write(const MetavoxelResources& resources, std::uint32_t inFlight, const MetavoxelDraw& draw) {

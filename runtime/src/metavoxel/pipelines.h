@@ -58,7 +58,6 @@ class MetavoxelPipelines {
   using Key = std::tuple<MetavoxelPass, std::uint32_t, std::uint32_t>;  // pass, index kind, grids
   Result<void> createLayouts();
   Result<void> createSets();
-  Result<VkPipeline> compile(const Key& key);
   void bind(VkCommandBuffer commands, VkDescriptorSet first, VkDescriptorSet second) const;
   VkDescriptorSet& matter(std::uint32_t inFlight, std::uint32_t number) {
     return matter_[inFlight * (volumes_ + 1) + number];

@@ -161,7 +161,7 @@ Result<void> MetavoxelResources::makeAll(const MetavoxelConfig& config, std::uin
   return keep(Image::make(device_, {.format = VK_FORMAT_R32_SFLOAT,
                                     .extent = {shadowEdge, shadowEdge, 1},
                                     .type = VK_IMAGE_TYPE_2D,
-                                    .usage = used | VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT}),
+                                    .usage = used | VK_IMAGE_USAGE_TRANSFER_SRC_BIT}),
               shadow);
 }
 
