@@ -130,7 +130,7 @@ TEST_F(MetavoxelLight, CullingChangesNothingThatIsSeen) {
   draw.cull = true;
   const headless::Picture seen = render(*metavoxels, draw);
   EXPECT_LT(metavoxels->stats().occupied, occupied * 3 / 4);
-  EXPECT_LT(largestDifference(all, seen), 5e-4f) << "they lie elsewhere in the pool: the filter rounds otherwise";
+  EXPECT_LT(largestDifference(all, seen), 1e-4f) << "they lie elsewhere in the pool: the filter rounds otherwise";
 }
 
 TEST_F(MetavoxelLight, ShadowFallsFromTheSun) {
