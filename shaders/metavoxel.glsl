@@ -18,6 +18,7 @@ pass;
 
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Words { uint items[]; };
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer Pairs { uvec2 items[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer Quads { uvec4 items[]; };
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Floats { float items[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer Counters { MetavoxelCounters value; };
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer Rounds { MetavoxelRound items[]; };
@@ -27,10 +28,12 @@ uint edgeTexels() { return meta.space.y; }
 uint innerVoxels() { return meta.space.z; }
 bool hasFlag(uint flag) { return (meta.space.w & flag) != 0u; }
 
-uint cellNumber(uvec3 cell) { return (cell.z * cellsAxis() + cell.y) * cellsAxis() + cell.x; }
+// Numbers are made of bits: a division by what is no constant takes as long as thirty other operations.
+uint cellBits() { return meta.picture.w; }
+uint cellNumber(uvec3 cell) { return (cell.z << cellBits() | cell.y) << cellBits() | cell.x; }
 uvec3 cellOf(uint number) {
-  const uint n = cellsAxis();
-  return uvec3(number % n, number / n % n, number / (n * n));
+  const uint mask = (1u << cellBits()) - 1u;
+  return uvec3(number & mask, number >> cellBits() & mask, number >> 2u * cellBits());
 }
 
 // World relative to the space's centre.
@@ -58,7 +61,9 @@ void grownCell(uvec3 cell, out vec3 low, out vec3 high) {
 }
 
 uvec3 slotCorner(uint slot) {
-  return uvec3(slot % meta.pool.x, slot / meta.pool.x % meta.pool.y, slot / (meta.pool.x * meta.pool.y)) * edgeTexels();
+  const uvec2 mask = (uvec2(1u) << meta.pool.xy) - 1u;
+  const uint row = slot >> meta.pool.x;
+  return uvec3(slot & mask.x, row & mask.y, row >> meta.pool.y) * edgeTexels();
 }
 uint texelNumber(uint slot, uvec3 texel) {
   return ((slot * edgeTexels() + texel.z) * edgeTexels() + texel.y) * edgeTexels() + texel.x;

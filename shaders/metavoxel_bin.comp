@@ -28,7 +28,7 @@ void main() {
   const uint number = gl_WorkGroupID.x;
   const Particle particle = Particles(meta.entries.zw).items[number];
   if (!(particle.radius > 0.0)) return;
-  const vec3 center = voxelOf(vectorOf(particle.center));
+  const vec3 center = voxelOf(particle.center);
   const float radius = particle.radius / meta.eye.w;
   const float inner = float(innerVoxels());
   const vec3 last = vec3(cellsAxis() - 1u);

@@ -4,27 +4,22 @@
 #define BILLOW_METAVOXEL_BLOCK
 
 #include "metavoxel_pool.glsl"
+#include "metavoxel_work.glsl"
 
 layout(local_size_x = 8, local_size_y = 8, local_size_z = 4) in;
 
 struct Block {
   uint slot;
-  uint position;
-  uint number;  // of the cell
   uvec3 cell;
   uvec3 at;     // among the metavoxel's blocks
   uvec3 texel;  // the block's first
 };
 
-Block blockOf() {
-  const uint blocks = blocksAxis();
-  const uint i = gl_WorkGroupID.x;
+Block blockOf(uvec2 item) {
   Block block;
-  block.slot = gl_WorkGroupID.y;
-  block.position = Rounds(meta.rounds.xy).items[pass.round].range.x + block.slot;
-  block.number = cellAt(block.position);
-  block.cell = cellOf(block.number);
-  block.at = uvec3(i % blocks, i / blocks % blocks, i / (blocks * blocks));
+  block.slot = (item.x & ~kAfterVolumes) >> 9;
+  block.cell = cellOf(item.y);
+  block.at = uvec3(item.x, item.x >> 3, item.x >> 6) & 7u;
   block.texel = block.at * kSubBlock;
   return block;
 }
@@ -37,17 +32,21 @@ uvec3 texelOf(Block block, uint i) {
 shared uint held;     // by the block: kBlockMatter, kBlockEmission
 shared uint touched;  // bit of each of the 27 blocks around that a texel with matter is in or beside
 
-// Notes matter in the block `block.at + shift`.
-uint touchBit(ivec3 shift) { return 1u << uint((shift.z + 1) * 9 + (shift.y + 1) * 3 + shift.x + 1); }
+// Bits of the blocks that a texel is in or beside: of an axis 1, 2 and 4 for the one before, its own and the next one,
+// and all their products.
+uint touchedBy(uvec3 inBlock) {
+  const uvec3 along = 2u | uvec3(equal(inBlock, uvec3(0u))) | uvec3(equal(inBlock, uvec3(kSubBlock - 1u))) << 2;
+  const uint y = (along.y & 1u) | (along.y & 2u) << 2 | (along.y & 4u) << 4;
+  const uint z = (along.z & 1u) | (along.z & 2u) << 8 | (along.z & 4u) << 16;
+  return along.x * y * z;
+}
 
+// Most texels find their bits set: an atomic operation on one word is slow when a whole group asks for it.
 void noteMatter(uvec3 inBlock, bool emits) {
-  atomicOr(held, kBlockMatter | (emits ? kBlockEmission : 0u));
-  const ivec3 side = ivec3(equal(inBlock, uvec3(kSubBlock - 1u))) - ivec3(equal(inBlock, uvec3(0u)));
-  uint bits = 0u;
-  for (uint corner = 0u; corner < 8u; ++corner) {
-    bits |= touchBit(side * ivec3(notEqual(corner & uvec3(1, 2, 4), uvec3(0u))));
-  }
-  atomicOr(touched, bits);
+  const uint holds = kBlockMatter | (emits ? kBlockEmission : 0u);
+  if ((held & holds) != holds) atomicOr(held, holds);
+  const uint bits = touchedBy(inBlock);
+  if ((touched & bits) != bits) atomicOr(touched, bits);
 }
 
 // Writes the thread's two texels, added to what earlier passes left (`old`, of loadTexel), and what the block holds.
@@ -78,6 +77,9 @@ void storeBlock(Block block, Texel values[2], bool first) {
     Words(meta.texels.xy).items[texelNumber(block.slot, texel)] = packRgb9e5(values[i].emission);
   }
   const uint i = gl_LocalInvocationIndex;
+  if (i == 0u && (held | before & kBlockMatter) == 0u) {
+    atomicAnd(Words(meta.rounds.zw).items[blockNumber(block.slot, block.at)], ~kBlockStale);
+  }
   if (i >= 27u || (touched >> i & 1u) == 0u) return;
   const uvec3 beside = block.at + uvec3(i % 3u, i / 3u % 3u, i / 9u) - 1u;
   if (any(greaterThanEqual(beside, uvec3(blocksAxis())))) return;

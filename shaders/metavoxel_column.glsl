@@ -13,12 +13,11 @@ struct Column {
 };
 
 Column columnOf() {
-  const uint blocks = blocksAxis();
   Column column;
-  column.slot = gl_WorkGroupID.y;
+  column.slot = gl_WorkGroupID.z;
   column.position = Rounds(meta.rounds.xy).items[pass.round].range.x + column.slot;
   column.cell = cellOf(cellAt(column.position));
-  column.block = uvec2(gl_WorkGroupID.x % blocks, gl_WorkGroupID.x / blocks);
+  column.block = gl_WorkGroupID.xy;
   column.texel = column.block * kSubBlock + gl_LocalInvocationID.xy;
   return column;
 }
@@ -39,10 +38,11 @@ uint columnNumber(uint position, uvec2 voxel) {
 // is an inner one of the next cell, and has its light.
 float depthAbove(uvec3 cell, uvec2 texel) {
   const uint inner = innerVoxels();
-  const uvec2 voxel = cell.xy * inner + texel - 1u;  // in the space; at its lower edge far beyond the upper
-  if (any(greaterThanEqual(voxel, uvec2(cellsAxis() * inner)))) return 0.0;
-  const uvec2 owner = voxel / inner;
-  const uvec2 at = voxel - owner * inner;
+  const uvec2 beyond = uvec2(greaterThan(texel, uvec2(inner)));
+  const uvec2 before = uvec2(equal(texel, uvec2(0u)));
+  const uvec2 owner = cell.xy + beyond - before;  // at the space's lower edge far beyond the upper
+  if (any(greaterThanEqual(owner, uvec2(cellsAxis())))) return 0.0;
+  const uvec2 at = texel - 1u + before * inner - beyond * inner;
   float depth = 0.0;
   for (uint z = ~Counters(meta.ramps.zw).value.boxMin.z; z < cell.z; ++z) {
     const uint position = positionOf(uvec3(owner, z));

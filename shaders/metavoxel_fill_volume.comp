@@ -7,7 +7,7 @@
 
 #include "medium.glsl"
 #include "metavoxel_block.glsl"
-#include "metavoxel_volume.glsl"
+#include "metavoxel_stage.glsl"
 
 const int kMostSamples = 4;  // an axis
 
@@ -19,13 +19,16 @@ vec3 indexAlong(uint g, vec3 way) {
 // Samples along an axis: a voxel of the space that spans several of the grid's takes their mean.
 int samplesAlong(vec3 step) { return clamp(int(ceil(length(step) - 0.25)), 1, kMostSamples); }
 
-float readGrid(uint g, vec3 world) {
-  const vec3 offset = vec3(params.grids[g].toIndex[0].w, params.grids[g].toIndex[1].w, params.grids[g].toIndex[2].w);
-  return sampleGrid(g, indexAlong(g, world) + offset, kFilterTrilinear);
+vec3 indexOf(uint g, vec3 world) {
+  return indexAlong(g, world) +
+         vec3(params.grids[g].toIndex[0].w, params.grids[g].toIndex[1].w, params.grids[g].toIndex[2].w);
 }
+float readGrid(uint g, vec3 world) { return sampleGrid(g, indexOf(g, world), kFilterTrilinear); }
 
-Texel sampleVolume(vec3 voxel) {
-  const vec3 world = worldOf(voxel);
+bool burning() { return hasGrid(kTemperatureSlot) || hasGrid(kFlamesSlot); }
+
+// Samples of a texel along each axis, for what is linear in its grid.
+ivec3 samplesOf() {
   ivec3 count = ivec3(1);
   for (uint g = 0u; g < kGridSlots; ++g) {
     if (!hasGrid(g)) continue;
@@ -33,43 +36,102 @@ Texel sampleVolume(vec3 voxel) {
       count[axis] = max(count[axis], samplesAlong(indexAlong(g, meta.toWorld[axis].xyz)));
     }
   }
-  // What fire gives off is no linear function of its grids: the mean over a voxel is not what its middle gives. Smoke's
-  // extinction is linear, and one sample is sharper.
-  const bool burning = hasGrid(kTemperatureSlot) || hasGrid(kFlamesSlot);
+  return count;
+}
+
+vec3 sampleShift(int i, ivec3 count) {
+  const ivec3 at = ivec3(i % count.x, i / count.x % count.y, i / (count.x * count.y));
+  const vec3 shift = (vec3(at) + 0.5) / vec3(count) - 0.5;
+  return meta.toWorld[0].xyz * shift.x + meta.toWorld[1].xyz * shift.y + meta.toWorld[2].xyz * shift.z;
+}
+
+Texel texelOf(float extinction, vec3 emission) {
+  return Texel(extinction > 0.0 ? params.albedo.rgb : vec3(0.0), extinction * meta.eye.w, emission * meta.eye.w);
+}
+
+// What fire gives off is no linear function of its grids: the mean over a voxel is not what its middle gives. Smoke's
+// extinction is linear, and one sample is sharper.
+Texel sampleVolume(vec3 voxel, ivec3 count) {
+  const vec3 world = worldOf(voxel);
   const bool sharp = hasGrid(kExtinctionSlot) && count == ivec3(1);
-  if (burning) count = max(count, 2);
+  if (burning()) count = max(count, 2);
   const int samples = count.x * count.y * count.z;
   float extinction = sharp ? extinctionOf(readGrid(kExtinctionSlot, world)) * float(samples) : 0.0;
   vec3 emission = vec3(0.0);
-  for (int i = 0; i < samples && (burning || !sharp); ++i) {
-    const ivec3 at = ivec3(i % count.x, i / count.x % count.y, i / (count.x * count.y));
-    const vec3 shift = (vec3(at) + 0.5) / vec3(count) - 0.5;
-    const vec3 place =
-        world + meta.toWorld[0].xyz * shift.x + meta.toWorld[1].xyz * shift.y + meta.toWorld[2].xyz * shift.z;
+  for (int i = 0; i < samples && (burning() || !sharp); ++i) {
+    const vec3 place = world + sampleShift(i, count);
     float value[3];
     for (uint g = 0u; g < kGridSlots; ++g) {
       const bool read = hasGrid(g) && !(sharp && g == kExtinctionSlot);
       value[g] = read ? readGrid(g, place) : 0.0;
     }
     if (!sharp) extinction += extinctionOf(value[extinctionSlot()]);
-    if (burning) emission += emissionOf(value[kTemperatureSlot], value[kFlamesSlot]);
+    if (burning()) emission += emissionOf(value[kTemperatureSlot], value[kFlamesSlot]);
   }
-  const float share = meta.eye.w / float(samples);
-  return Texel(extinction > 0.0 ? params.albedo.rgb : vec3(0.0), extinction * share, emission * share);
+  return texelOf(extinction / float(samples), emission / float(samples));
+}
+
+// The same for both texels of each thread, 2^3 samples each, from staged values. One grid is staged at a time.
+const int kStagedSamples = 8;
+
+void sampleStaged(Block block, Stage temperature, Stage flames, out Texel values[2]) {
+  float heat[2 * kStagedSamples];
+  float extinction[2] = float[2](0.0, 0.0);
+  vec3 emission[2] = vec3[2](vec3(0.0), vec3(0.0));
+  const uint source = extinctionSlot();
+  vec3 middle[2];
+  for (uint i = 0u; i < 2u; ++i) {
+    middle[i] = worldOf(texelVoxel(block.cell, texelOf(block, i)));
+    if (source == kExtinctionSlot) {
+      extinction[i] = extinctionOf(readGrid(source, middle[i])) * float(kStagedSamples);
+    }
+  }
+  if (hasGrid(kTemperatureSlot)) loadStage(kTemperatureSlot, temperature);
+  for (int s = 0; s < 2 * kStagedSamples; ++s) {
+    const vec3 place = middle[s / kStagedSamples] + sampleShift(s % kStagedSamples, ivec3(2));
+    heat[s] = hasGrid(kTemperatureSlot) ? readStage(temperature, indexOf(kTemperatureSlot, place)) : 0.0;
+    if (source == kTemperatureSlot) extinction[s / kStagedSamples] += extinctionOf(heat[s]);
+  }
+  if (hasGrid(kFlamesSlot)) loadStage(kFlamesSlot, flames);
+  for (int s = 0; s < 2 * kStagedSamples; ++s) {
+    const vec3 place = middle[s / kStagedSamples] + sampleShift(s % kStagedSamples, ivec3(2));
+    const float flame = hasGrid(kFlamesSlot) ? readStage(flames, indexOf(kFlamesSlot, place)) : 0.0;
+    emission[s / kStagedSamples] += emissionOf(heat[s], flame);
+    if (source == kFlamesSlot) extinction[s / kStagedSamples] += extinctionOf(flame);
+  }
+  for (uint i = 0u; i < 2u; ++i) {
+    values[i] = texelOf(extinction[i] / float(kStagedSamples), emission[i] / float(kStagedSamples));
+  }
+}
+
+void sampleBlock(Block block, vec3 from, vec3 to, out Texel values[2]) {
+  const ivec3 count = samplesOf();
+  if (burning() && count == ivec3(1)) {
+    const Stage temperature = stageOf(kTemperatureSlot, from, to);
+    const Stage flames = stageOf(kFlamesSlot, from, to);
+    const bool fit = (!hasGrid(kTemperatureSlot) || fits(temperature)) && (!hasGrid(kFlamesSlot) || fits(flames));
+    if (fit) {
+      sampleStaged(block, temperature, flames, values);
+      return;
+    }
+  }
+  for (uint i = 0u; i < 2u; ++i) values[i] = sampleVolume(texelVoxel(block.cell, texelOf(block, i)), count);
 }
 
 void main() {
-  const Block block = blockOf();
-  const uint volumes = wordOf(block.number) >> kVolumeBit;
+  if (workItem() >= Rounds(meta.rounds.xy).items[pass.round].volumes.w) return;
+  const uvec2 item = Pairs(meta.work.xy).items[workItem()];
+  const Block block = blockOf(item);
+  const uint volumes = wordOf(item.y) >> kVolumeBit;
   if ((volumes >> pass.volume & 1u) == 0u) return;
   const bool first = (volumes & ((1u << pass.volume) - 1u)) == 0u;
+  const bool stale = (blockHolds(block.slot, block.at) & kBlockStale) != 0u;
   const vec3 middle = texelVoxel(block.cell, block.texel);
-  const bool some = volumeHas(middle - 0.5, middle + float(kSubBlock) - 0.5);
-  if (!some && !first) return;
-  Texel values[2];
-  for (uint i = 0u; i < 2u; ++i) {
-    values[i] = Texel(vec3(0.0), 0.0, vec3(0.0));
-    if (some) values[i] = sampleVolume(texelVoxel(block.cell, texelOf(block, i)));
-  }
+  const vec3 from = middle - 0.5;
+  const vec3 to = middle + float(kSubBlock) - 0.5;
+  const bool some = volumeHas(from, to);
+  if (!some && !(first && stale)) return;
+  Texel values[2] = Texel[2](Texel(vec3(0.0), 0.0, vec3(0.0)), Texel(vec3(0.0), 0.0, vec3(0.0)));
+  if (some) sampleBlock(block, from, to, values);
   storeBlock(block, values, first);
 }

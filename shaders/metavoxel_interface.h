@@ -18,7 +18,13 @@ BILLOW_GPU_CONST kSubBlock = 8u;       // texels an edge of what one workgroup o
 BILLOW_GPU_CONST kBlockMatter = 1u;    // of a block of texels: some have extinction or emission
 BILLOW_GPU_CONST kBlockEmission = 2u;  // some have emission; else none of the block's is written
 BILLOW_GPU_CONST kBlockNear = 4u;      // matter within it or in a texel beside it
+BILLOW_GPU_CONST kBlockStale = 8u;     // texels may be other than 0, from what the slot held before
+BILLOW_GPU_CONST kAfterVolumes = 1u << 31;  // of a work item: passes of volumes come before
+BILLOW_GPU_CONST kWorkGroups = 256u;   // along x of a dispatch with a workgroup a work item
 BILLOW_GPU_CONST kVolumeBit = 24u;     // of a cell's word: below it particles are counted, from it on volumes flagged
+BILLOW_GPU_CONST kUseErosion = 1u;  // of materials, all together: what none uses is left out of the code that fills
+BILLOW_GPU_CONST kUseRamps = 2u;
+BILLOW_GPU_CONST kUseCurves = 4u;
 BILLOW_GPU_CONST kMaxVolumes = 8u;
 BILLOW_GPU_CONST kCubeLayers = 6u;       // of a cube map: faces, each with a border of one texel
 BILLOW_GPU_CONST kCubeFaceTexels = 66u;  // an edge, border included
@@ -30,11 +36,13 @@ BILLOW_GPU_CONST kFlagSceneDepth = 4u;  // rays end at the scene
 // One thing to draw: the metavoxels at positions first to first + count - 1.
 struct MetavoxelRound {
   uvec4 range;    // first, count, 1: in front of all that were drawn before, 0: behind; 0
-  uvec4 fill;     // indirect dispatch of fill's workgroups, 0
+  uvec4 blocks;   // indirect dispatch, a workgroup a metavoxel; 0
+  uvec4 volumes;  // of passes with a workgroup a block of a metavoxel in which a volume is; number of those blocks
+  uvec4 fill;     // the same for blocks that particles reach, or from which they are gone
   uvec4 columns;  // of passes with a thread a column of texels, 0
   uvec4 march;    // of the picture's workgroups, 0
 };
-BILLOW_GPU_SIZE(MetavoxelRound, 64);
+BILLOW_GPU_SIZE(MetavoxelRound, 96);
 
 struct MetavoxelCounters {
   uvec4 wanted;  // occupied cells (more than fit are left out), list entries, the same; drawn cells; 0
@@ -50,11 +58,13 @@ struct MetavoxelParams {
   vec4 toWorld[3];       // world step of a voxel along each axis of the space; w: middle of the space, in voxels
   vec4 eye;              // world - centre; w: voxel edge in world units
   vec4 planes[kPlanes];  // inside where dot(plane.xyz, voxel) + plane.w >= 0
-  vec4 tint;      // extinction of red, green and blue light on its way from the sun, as multiples of the extinction
+  vec4 tint;      // extinction of red, green and blue light on its way from the sun, as multiples of the extinction;
+                  // w: depth of a layer in the image of cube maps
+  vec4 texel;     // of the pool, in texture coordinates; 0
   uvec4 space;    // cells an axis, edge, inner, flags
-  uvec4 pool;     // slots along x, slots along y, slots, most occupied cells
+  uvec4 pool;     // log2 of slots along x and along y, slots, most occupied cells
   uvec4 limits;   // particles, list entries, volumes, rounds
-  uvec4 picture;  // workgroups of the march along x, along y; number of the draw; 0
+  uvec4 picture;  // workgroups of the march along x, along y; number of the draw; bits of a cell's number an axis
   uvec4 cells;    // addresses (low, high): words; positions + 1, 0 where nothing is drawn
   uvec4 items;    // addresses: occupied cells in the order of their finding; cells by position
   uvec4 lists;    // addresses: first and count of the list at each position; cursors into them
@@ -63,8 +73,9 @@ struct MetavoxelParams {
   uvec4 tables;   // addresses: materials; curves
   uvec4 ramps;    // addresses: ramps; counters
   uvec4 rounds;   // addresses: rounds; what the pool's blocks of texels hold
+  uvec4 work;     // addresses: work items of volumes; of particles (metavoxel_work.glsl)
 };
-BILLOW_GPU_SIZE(MetavoxelParams, 25 * 16);
+BILLOW_GPU_SIZE(MetavoxelParams, 27 * 16);
 
 #ifdef __cplusplus
 }  // namespace billow::runtime::gpu

@@ -44,9 +44,8 @@ vec2 crossBox(Ray ray, vec3 low, vec3 high) {
 // A fixed pattern in [0, 1) that hides banding (Jimenez 2014, "Next generation post processing in Call of Duty").
 float interleavedNoise(vec2 pixel) { return fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715)))); }
 
-// One step of length dt, as the direct march has it; both values are per voxel edge.
-void shade(vec4 value, float depth, float dt, inout Sum sum) {
-  const float edges = dt / meta.eye.w;
+// One step of `edges` voxel edges, as the direct march has it; both values are per voxel edge.
+void shade(vec4 value, float depth, float edges, inout Sum sum) {
   const float opticalDepth = value.a * edges;
   const float after = exp(-opticalDepth);
   const float span = opticalDepth < 1e-3 ? edges * (1.0 - 0.5 * opticalDepth) : (1.0 - after) / value.a;
@@ -55,27 +54,25 @@ void shade(vec4 value, float depth, float dt, inout Sum sum) {
   sum.transmittance *= after;
 }
 
-vec4 readSlot(uint slot, vec3 inCell) {
-  return textureLod(lit, (vec3(slotCorner(slot)) + inCell + 1.0) / vec3(textureSize(lit, 0)), 0.0);
-}
-
-// Samples lie at (k + shift) * dt. All in distance; `stop` is where the space or the scene ends.
+// Samples lie at distances (k + shift) * dt.
 struct Steps {
   float dt;
   float shift;
-  float end;   // of the scene
-  float stop;  // of samples
+  float edges;  // of a whole step
+  float end;    // of the scene, in voxel edges, and half a step
 };
 
 // From sample k on through a box of texels of one metavoxel, to sample `next`.
 void marchBox(Ray ray, Steps steps, uint slot, vec3 corner, float next, float seen, inout float k, inout Sum sum) {
+  const vec3 origin = ray.origin - corner;
+  const vec3 first = (vec3(slotCorner(slot)) + 1.0) * meta.texel.xyz;
   for (; k < next && sum.transmittance * seen > kOpaque; k += 1.0) {
     const float t = (k + steps.shift) * steps.dt;
+    const vec3 inCell = clamp(origin + ray.direction * t, 0.0, float(innerVoxels()));
+    const vec4 value = textureLod(lit, first + inCell * meta.texel.xyz, 0.0);
     // A step that crosses the scene counts for what lies before it.
-    const float length = min(steps.dt, steps.end - (t - 0.5 * steps.dt));
-    if (t >= steps.stop || length <= 0.0) return;
-    const vec3 inCell = clamp(ray.origin + ray.direction * t - corner, 0.0, float(innerVoxels()));
-    shade(readSlot(slot, inCell), t / ray.perDepth, length, sum);
+    const float edges = min(steps.edges, max(steps.end - (k + steps.shift) * steps.edges, 0.0));
+    shade(value, t / ray.perDepth, edges, sum);
   }
 }
 
@@ -87,12 +84,13 @@ Sum march(Ray ray, float end, float shift, float seen) {
   const float inner = float(innerVoxels());
   const vec2 span = crossBox(ray, vec3(box.low) * inner, vec3(box.high) * inner);
   const float dt = params.forward.w * meta.eye.w * ray.perDepth;
-  const Steps steps = Steps(dt, shift, end, min(span.y, end + 0.5 * dt));
-  if (range.y == 0u || !(max(span.x, 0.0) < steps.stop)) return sum;
+  const float edges = dt / meta.eye.w;
+  const Steps steps = Steps(dt, shift, edges, end / meta.eye.w + 0.5 * edges);
+  if (range.y == 0u) return sum;
   float k = max(ceil(span.x / dt - shift), 0.0);
-  while (sum.transmittance * seen > kOpaque) {
+  const float last = ceil(min(span.y, end + 0.5 * dt) / dt - shift);
+  while (k < last && sum.transmittance * seen > kOpaque) {
     const float t = (k + shift) * dt;
-    if (t >= steps.stop) break;
     const vec3 voxel = ray.origin + ray.direction * t;
     const vec3 cell = clamp(floor(voxel / inner), vec3(box.low), vec3(box.high - 1u));
     const vec3 corner = cell * inner;
@@ -107,9 +105,9 @@ Sum march(Ray ray, float end, float shift, float seen) {
       low = max(low, corner - 1.0 + block * float(kSubBlock));
       high = min(high, corner - 1.0 + (block + 1.0) * float(kSubBlock));
     }
-    const float next = max(k + 1.0, ceil(crossBox(ray, low, high).y / dt - shift));
+    const float next = min(max(k + 1.0, ceil(crossBox(ray, low, high).y / dt - shift)), last);
     if (near) marchBox(ray, steps, slot, corner, next, seen, k, sum);
-    if (near && k < next) break;  // opaque, or at the end
+    if (near && k < next) break;  // opaque
     k = next;
   }
   return sum;

@@ -7,8 +7,6 @@
 
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Particles { Particle items[]; };
 
-vec3 vectorOf(float v[3]) { return vec3(v[0], v[1], v[2]); }
-
 // Whether a sphere has a point in a box.
 bool meets(vec3 center, float radius, vec3 low, vec3 high) {
   const vec3 apart = max(max(low - center, center - high), vec3(0.0));

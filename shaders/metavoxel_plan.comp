@@ -20,8 +20,10 @@ void planRounds(uint items) {
     const uint some = count == 0u ? 0u : 1u;
     const uint march = i == 0u ? 1u : some;  // the first begins the picture
     rounds.items[i].range = uvec4(next, count, front ? 1u : 0u, 0u);
-    rounds.items[i].fill = uvec4(blocks * blocks * blocks * some, count, some, 0u);
-    rounds.items[i].columns = uvec4(blocks * blocks * some, count, some, 0u);
+    rounds.items[i].blocks = uvec4(count, some, some, 0u);
+    rounds.items[i].volumes = uvec4(kWorkGroups, 0u, 1u, 0u);  // these two grow with the work that is found
+    rounds.items[i].fill = uvec4(kWorkGroups, 0u, 1u, 0u);
+    rounds.items[i].columns = uvec4(blocks, blocks, count, 0u);
     rounds.items[i].march = uvec4(meta.picture.xy * march, march, 0u);
     next += count;
   }
@@ -42,7 +44,7 @@ void main() {
   barrier();
   if (gl_LocalInvocationID.x != 0u) return;
   const bool all = wanted > meta.pool.w;
-  const uint cells = cellsAxis() * cellsAxis() * cellsAxis();
+  const uint cells = 1u << 3u * cellBits();
   counters.value.reset = uvec4(((all ? cells : items) + 255u) / 256u, 1u, 1u, all ? 1u : 0u);
   counters.value.rank = uvec4((items + 255u) / 256u, 1u, 1u, before);
   counters.value.wanted.z = items;

@@ -12,7 +12,7 @@ void main() {
   const MetavoxelCounters counters = Counters(meta.ramps.zw).value;
   const uint i = gl_GlobalInvocationID.x;
   const bool all = counters.reset.w != 0u;
-  if (i >= (all ? cellsAxis() * cellsAxis() * cellsAxis() : counters.wanted.x)) return;
+  if (i >= (all ? 1u << 3u * cellBits() : counters.wanted.x)) return;
   const uint cell = all ? i : Words(meta.items.xy).items[i];
   Words(meta.cells.xy).items[cell] = 0u;
   Words(meta.cells.zw).items[cell] = 0u;

@@ -9,6 +9,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Ma
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Ramps { vec4 items[]; };
 
 layout(set = 1, binding = 3) uniform sampler3D cubes;  // faces along z
+layout(constant_id = 5) const uint kUses = 7u;         // of the materials
 
 vec3 rotated(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
 
@@ -30,7 +31,7 @@ float sampleCube(uint map, vec3 direction) {
   const vec2 share = d.z > 0.0 ? d.xy / d.z * 0.5 + 0.5 : vec2(0.5);
   const float texels = float(kCubeFaceTexels);
   const vec2 at = (share * (texels - 2.0) + 1.0) / texels;
-  return textureLod(cubes, vec3(at, (float(map * kCubeLayers + face) + 0.5) / float(textureSize(cubes, 0).z)), 0.0).r;
+  return textureLod(cubes, vec3(at, (float(map * kCubeLayers + face) + 0.5) * meta.tint.w), 0.0).r;
 }
 
 float sampleCurve(uint row, float x) {
@@ -53,7 +54,7 @@ vec3 sampleRamp(uint row, float r, float age) {
 
 // Share of the way from the middle to the surface before displacement.
 float shareOf(Particle particle, vec3 q) {
-  const vec3 shape = vectorOf(particle.shape);
+  const vec3 shape = particle.shape;
   if (particle.kind == kKindSphere) return length(q) / particle.radius;
   if (particle.kind == kKindEllipsoid) return length(q / shape);
   if (particle.kind == kKindBox) {
@@ -66,7 +67,7 @@ float shareOf(Particle particle, vec3 q) {
 
 float profileOf(ParticleMaterial material, float r) {
   if (material.profile == kProfileRadial) return 1.0 - r * r;
-  return material.profile == kProfileCurve ? clamp(sampleCurve(material.profileRow, r), 0.0, 1.0) : 1.0;
+  return (kUses & kUseCurves) != 0u && material.profile == kProfileCurve ? clamp(sampleCurve(material.profileRow, r), 0.0, 1.0) : 1.0;
 }
 
 struct Matter {  // per world unit
@@ -78,7 +79,7 @@ struct Matter {  // per world unit
 // False where the particle has no density. `apart` is the way from its centre, inside of the bounding sphere.
 bool matterAt(Particle particle, ParticleMaterial material, vec3 apart, out Matter matter) {
   matter = Matter(0.0, vec3(0.0), vec3(0.0));
-  const vec4 turn = vec4(-particle.rotation[0], -particle.rotation[1], -particle.rotation[2], particle.rotation[3]);
+  const vec4 turn = vec4(-particle.rotation.xyz, particle.rotation.w);
   const vec3 q = rotated(turn, apart);
   const float s = shareOf(particle, q);
   if (!(s < 1.0)) return false;
@@ -86,16 +87,17 @@ bool matterAt(Particle particle, ParticleMaterial material, vec3 apart, out Matt
   const float r = s / (1.0 - particle.displacement * (1.0 - m));
   if (!(r < 1.0)) return false;
   float density = profileOf(material, r) * clamp((1.0 - r) / material.softness, 0.0, 1.0);
-  if (material.erosion > 0.0) {
+  if ((kUses & kUseErosion) != 0u && material.erosion > 0.0) {
     const vec3 at = q * (material.erosionFrequency / particle.radius);
     density *= clamp(1.0 - material.erosion + erosionNoise(at.x, at.y, at.z, particle.seed), 0.0, 1.0);
   }
   if (!(density > 0.0)) return false;
   matter.extinction = density * particle.extinction;
-  matter.diffuse = vectorOf(particle.diffuse) * (1.0 - material.occlusion * (1.0 - m));
-  if (material.diffuseRamp != kNoRow) matter.diffuse *= sampleRamp(material.diffuseRamp, r, particle.age);
-  matter.emission = density * vectorOf(particle.emission);
-  if (material.emissionRamp != kNoRow) matter.emission *= sampleRamp(material.emissionRamp, r, particle.age);
+  matter.diffuse = particle.diffuse * (1.0 - material.occlusion * (1.0 - m));
+  const bool ramps = (kUses & kUseRamps) != 0u;
+  if (ramps && material.diffuseRamp != kNoRow) matter.diffuse *= sampleRamp(material.diffuseRamp, r, particle.age);
+  matter.emission = density * particle.emission;
+  if (ramps && material.emissionRamp != kNoRow) matter.emission *= sampleRamp(material.emissionRamp, r, particle.age);
   return true;
 }
 

@@ -10,6 +10,7 @@ using std::uint32_t;
 #include "march_single.spv.h"
 #include "metavoxel_bin.spv.h"
 #include "metavoxel_bin_volume.spv.h"
+#include "metavoxel_blocks.spv.h"
 #include "metavoxel_clear.spv.h"
 #include "metavoxel_fill.spv.h"
 #include "metavoxel_fill_volume.spv.h"

@@ -85,7 +85,7 @@ class MetavoxelsImpl final : public Metavoxels {
   struct Steps {  // a draw's pipelines and volumes, all made before anything is recorded
     Space space;
     std::vector<VolumeSteps> volumes;
-    VkPipeline clear, reset, binCount, binWrite, plan, rank, fill, sum, light, shadow, march, finish;
+    VkPipeline clear, reset, binCount, binWrite, plan, rank, blocks, fill, sum, light, shadow, march, finish;
   };
 
   Result<Steps> prepare(const MetavoxelDraw& draw) {
@@ -99,6 +99,7 @@ class MetavoxelsImpl final : public Metavoxels {
                                                             {binWrite, &steps.binWrite},
                                                             {plan, &steps.plan},
                                                             {rank, &steps.rank},
+                                                            {blocks, &steps.blocks},
                                                             {fill, &steps.fill},
                                                             {sum, &steps.sum},
                                                             {light, &steps.light},
@@ -154,6 +155,7 @@ class MetavoxelsImpl final : public Metavoxels {
     params.tables = both(r.materials, r.curves);
     params.ramps = both(r.ramps, r.counters);
     params.rounds = both(r.rounds, r.blocks);
+    params.work = both(r.volumeWork, r.fillWork);
     put(upload.space, params);
     pipelines_.write(resources_, next_, draw);
     return {};
@@ -241,21 +243,19 @@ class MetavoxelsImpl final : public Metavoxels {
   void recordRound(VkCommandBuffer commands, const MetavoxelDraw& draw, const Steps& steps, std::uint32_t round,
                    std::uint32_t rounds) {
     const std::uint64_t at = resources_.sizes().regions.rounds + round * sizeof(gpu::MetavoxelRound);
-    const std::uint64_t fill = at + offsetof(gpu::MetavoxelRound, fill);
     const std::uint64_t columns = at + offsetof(gpu::MetavoxelRound, columns);
-    const MetavoxelSizes& sizes = resources_.sizes();
-    device_.api.vkCmdFillBuffer(commands, resources_.arrays.handle(), sizes.regions.blocks, sizes.blocks() * 4, 0);
-    barrier(commands);
     PassPush push{.round = round, .finish = rounds == 1 ? 1u : 0u};
+    indirect(commands, steps.blocks, push, at + offsetof(gpu::MetavoxelRound, blocks));
+    barrier(commands);
     for (std::uint32_t i = 0; i < steps.volumes.size(); ++i) {
       if (!steps.volumes[i].drawn()) continue;
       pipelines_.bindVolume(commands, next_, i);
       push.volume = i;
-      indirect(commands, steps.volumes[i].fill, push, fill);
+      indirect(commands, steps.volumes[i].fill, push, at + offsetof(gpu::MetavoxelRound, volumes));
       barrier(commands);
     }
     pipelines_.bindView(commands, next_);
-    indirect(commands, steps.fill, push, fill);
+    indirect(commands, steps.fill, push, at + offsetof(gpu::MetavoxelRound, fill));
     barrier(commands);
     if (round == 0) stamp(commands, draw, 2);
     indirect(commands, steps.sum, push, columns);

@@ -14,12 +14,12 @@ using Code = std::span<const std::uint32_t>;
 
 // In the order of MetavoxelPass.
 Code codeOf(MetavoxelPass pass) {
-  static const Code codes[] = {spirv::kMetavoxelClear,       spirv::kMetavoxelReset,       spirv::kMetavoxelBin,
-                               spirv::kMetavoxelBin,         spirv::kMetavoxelBinVolume,   spirv::kMetavoxelPlan,
-                               spirv::kMetavoxelRank,        spirv::kMetavoxelFill,        spirv::kMetavoxelFillVolume,
-                               spirv::kMetavoxelSum,         spirv::kMetavoxelLight,       spirv::kMetavoxelShadow,
-                               spirv::kMetavoxelMarchHalf,   spirv::kMetavoxelMarchSingle, spirv::kMetavoxelFinishHalf,
-                               spirv::kMetavoxelFinishSingle};
+  static const Code codes[] = {spirv::kMetavoxelClear,      spirv::kMetavoxelReset,       spirv::kMetavoxelBin,
+                               spirv::kMetavoxelBin,        spirv::kMetavoxelBinVolume,   spirv::kMetavoxelPlan,
+                               spirv::kMetavoxelRank,       spirv::kMetavoxelBlocks,      spirv::kMetavoxelFill,
+                               spirv::kMetavoxelFillVolume, spirv::kMetavoxelSum,         spirv::kMetavoxelLight,
+                               spirv::kMetavoxelShadow,     spirv::kMetavoxelMarchHalf,   spirv::kMetavoxelMarchSingle,
+                               spirv::kMetavoxelFinishHalf, spirv::kMetavoxelFinishSingle};
   return codes[static_cast<std::size_t>(pass)];
 }
 
@@ -58,6 +58,16 @@ MetavoxelPipelines::~MetavoxelPipelines() {
   for (const VkDescriptorSetLayout layout : {matterLayout_, spaceLayout_}) {
     if (layout != VK_NULL_HANDLE) device_.api.vkDestroyDescriptorSetLayout(device, layout, nullptr);
   }
+}
+
+std::uint32_t MetavoxelPipelines::usesOf(std::span<const format::ParticleMaterial> materials) {
+  std::uint32_t uses = 0;
+  for (const format::ParticleMaterial& material : materials) {
+    if (material.erosion > 0) uses |= gpu::kUseErosion;
+    if (material.diffuseRamp != format::kNoRow || material.emissionRamp != format::kNoRow) uses |= gpu::kUseRamps;
+    if (material.profile == format::kProfileCurve) uses |= gpu::kUseCurves;
+  }
+  return uses;
 }
 
 Result<void> MetavoxelPipelines::create() {
@@ -125,8 +135,9 @@ Result<VkPipeline> MetavoxelPipelines::pipeline(MetavoxelPass pass, const FrameI
   // The place first, so that no pipeline is lost where there is no memory for it.
   VkPipeline& place = pipelines_[key];
   if (place != VK_NULL_HANDLE) return place;
-  const std::uint32_t constants[] = {grids.index, gpu::kFilterTrilinear, gpu::kFilterNone, grids.grids,
-                                     pass == MetavoxelPass::binWrite ? 1u : 0u};
+  const std::uint32_t constants[] = {
+      grids.index, gpu::kFilterTrilinear, gpu::kFilterNone, grids.grids, pass == MetavoxelPass::binWrite ? 1u : 0u,
+      uses_};
   auto made = makeComputePipeline(device_, layout_, codeOf(pass), constants);
   if (made) place = *made;
   return made;

@@ -3,6 +3,7 @@
 #define BILLOW_RUNTIME_METAVOXEL_PIPELINES_H
 
 #include <map>
+#include <span>
 #include <tuple>
 
 #include "frame.h"
@@ -18,6 +19,7 @@ enum class MetavoxelPass : std::uint32_t {
   binVolume,
   plan,
   rank,
+  blocks,
   fill,
   fillVolume,
   sum,
@@ -38,7 +40,10 @@ struct PassPush {
 class MetavoxelPipelines {
  public:
   MetavoxelPipelines(Device& device, const MetavoxelConfig& config)
-      : device_(device), inFlight_(config.recordsInFlight), volumes_(config.maxVolumes) {}
+      : device_(device),
+        inFlight_(config.recordsInFlight),
+        volumes_(config.maxVolumes),
+        uses_(config.tables != nullptr ? usesOf(config.tables->materials) : 0) {}
   MetavoxelPipelines(const MetavoxelPipelines&) = delete;
   MetavoxelPipelines& operator=(const MetavoxelPipelines&) = delete;
   ~MetavoxelPipelines();
@@ -55,7 +60,8 @@ class MetavoxelPipelines {
   void push(VkCommandBuffer commands, const PassPush& push) const;
 
  private:
-  using Key = std::tuple<MetavoxelPass, std::uint32_t, std::uint32_t>;  // pass, index kind, grids
+  static std::uint32_t usesOf(std::span<const format::ParticleMaterial> materials);  // gpu::kUse...
+  using Key = std::tuple<MetavoxelPass, std::uint32_t, std::uint32_t>;               // pass, index kind, grids
   Result<void> createLayouts();
   Result<void> createSets();
   void bind(VkCommandBuffer commands, VkDescriptorSet first, VkDescriptorSet second) const;
@@ -66,6 +72,7 @@ class MetavoxelPipelines {
   Device& device_;
   std::uint32_t inFlight_;
   std::uint32_t volumes_;
+  std::uint32_t uses_;
   VkDescriptorSetLayout matterLayout_ = VK_NULL_HANDLE;  // MarchParams and a volume's atlas
   VkDescriptorSetLayout spaceLayout_ = VK_NULL_HANDLE;   // MetavoxelParams and all images
   VkPipelineLayout layout_ = VK_NULL_HANDLE;

@@ -216,6 +216,7 @@ void MetavoxelResources::recordFirst(VkCommandBuffer commands) const {
   }
   imageBarrier(device_, commands, cubes, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
   device_.api.vkCmdFillBuffer(commands, arrays.handle(), 0, regions.particles, 0);
+  device_.api.vkCmdFillBuffer(commands, arrays.handle(), regions.blocks, sizes_.blocks() * 4, gpu::kBlockStale);
   const VkBufferCopy copy{parts.materials, regions.materials, parts.cubes};
   device_.api.vkCmdCopyBuffer(commands, tables_.handle(), arrays.handle(), 1, &copy);
   VkBufferImageCopy faces{};

@@ -12,14 +12,14 @@ std::uint64_t bytesOf(const Rows& rows) {
   return rows.size() * sizeof(rows[0]);
 }
 
-// Slots as an image's box: rows of eight, layers of eight rows. Never more than asked for.
+// Slots as an image's box: rows of eight, layers of eight rows, or fewer, powers of two. Never more than asked for.
 void shapeSlots(std::uint64_t slots, std::uint32_t maxImageExtent3D, MetavoxelSizes& sizes) {
   const std::uint64_t along = std::max<std::uint64_t>(maxImageExtent3D / sizes.edge, 1);
   const auto part = [&](std::uint64_t wanted, std::uint64_t most) {
     return static_cast<std::uint32_t>(std::clamp<std::uint64_t>(wanted, 1, std::min(most, along)));
   };
-  sizes.slotsX = part(slots, 8);
-  sizes.slotsY = part(slots / sizes.slotsX, 8);
+  sizes.slotsX = std::bit_floor(part(slots, 8));
+  sizes.slotsY = std::bit_floor(part(slots / sizes.slotsX, 8));
   sizes.slotsZ = part(slots / (std::uint64_t{sizes.slotsX} * sizes.slotsY), along);
 }
 
@@ -49,6 +49,8 @@ MetavoxelRegions regionsOf(const MetavoxelConfig& config, const MetavoxelSizes& 
   regions.ramps = region(bytesOf(tables.ramps));
   regions.columns = region(most * sizes.inner * sizes.inner * 4);
   regions.blocks = region(sizes.blocks() * 4);
+  regions.volumeWork = region(sizes.blocks() * 8);
+  regions.fillWork = region(sizes.blocks() * 16);
   regions.emission = region(std::uint64_t{sizes.slots()} * sizes.edge * sizes.edge * sizes.edge * 4);
   regions.bytes = end;
   return regions;
@@ -71,7 +73,8 @@ MetavoxelSizes metavoxelSizes(const MetavoxelConfig& config, std::uint64_t slots
   sizes.edge = config.edge;
   sizes.inner = config.edge - 2;
   sizes.axis = config.metavoxels;
-  sizes.most = static_cast<std::uint32_t>(std::min<std::uint64_t>(config.maxMetavoxels, sizes.cells()));
+  sizes.most = static_cast<std::uint32_t>(
+      std::min<std::uint64_t>(config.maxMetavoxels, std::uint64_t{sizes.axis} * sizes.axis * sizes.axis));
   shapeSlots(slots, maxImageExtent3D, sizes);
   // The cells before the eye and those after it each begin a round of their own.
   sizes.rounds = sizes.slots() >= sizes.most ? 1 : (sizes.most + sizes.slots() - 1) / sizes.slots() + 1;

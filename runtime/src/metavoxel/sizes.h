@@ -2,6 +2,8 @@
 #ifndef BILLOW_RUNTIME_METAVOXEL_SIZES_H
 #define BILLOW_RUNTIME_METAVOXEL_SIZES_H
 
+#include <bit>
+
 #include "api.h"
 #include "billow/runtime/metavoxel.h"
 #include "metavoxel_interface.h"
@@ -14,7 +16,7 @@ inline constexpr std::uint64_t kTexelBytes = 12;  // 8 of the pool's image, 4 of
 // Where the arrays of metavoxel_interface.h begin in the device's buffer.
 struct MetavoxelRegions {
   std::uint64_t counters, rounds, words, positions, found, cellAt, lists, cursors, entries, particles, materials,
-      curves, ramps, columns, blocks, emission;
+      curves, ramps, columns, blocks, volumeWork, fillWork, emission;
   std::uint64_t bytes;
 };
 
@@ -31,7 +33,9 @@ struct MetavoxelSizes {
     const std::uint64_t along = (edge + gpu::kSubBlock - 1) / gpu::kSubBlock;
     return slots() * along * along * along;
   }
-  std::uint64_t cells() const { return std::uint64_t{axis} * axis * axis; }
+  std::uint32_t cellBits() const { return static_cast<std::uint32_t>(std::bit_width(axis - 1)); }  // an axis
+  // In the tables of cells, whose numbers are made of whole bits.
+  std::uint64_t cells() const { return std::uint64_t{1} << 3 * cellBits(); }
   std::uint32_t shadowEdge() const { return axis * inner; }
 };
 

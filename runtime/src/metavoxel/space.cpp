@@ -1,6 +1,7 @@
 #include "space.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "billow/format/affine.h"
@@ -35,6 +36,10 @@ Vec3d toDouble(const std::array<float, 3>& v) {
 
 gpu::vec4 vec4(const Vec3d& v, double w) {
   return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2]), static_cast<float>(w)};
+}
+
+std::uint32_t log2Of(std::uint32_t power) {
+  return static_cast<std::uint32_t>(std::countr_zero(power));
 }
 
 // The axis of the world that is most nearly perpendicular to z, made so.
@@ -180,15 +185,17 @@ gpu::MetavoxelParams paramsOf(const Space& space, const MetavoxelDraw& draw, con
   }
   params.eye = vec4(minus(draw.view.eye, space.center), space.voxel);
   addPlanes(space, draw, params);
-  params.tint = vec4(toDouble(draw.lightExtinction), 0);
+  params.tint = vec4(toDouble(draw.lightExtinction), 1.0 / sizes.cubeLayers);
+  params.texel = vec4(
+      {1.0 / (sizes.slotsX * sizes.edge), 1.0 / (sizes.slotsY * sizes.edge), 1.0 / (sizes.slotsZ * sizes.edge)}, 0);
   const std::uint32_t flags = (draw.cull ? gpu::kFlagCull : 0) |
                               (draw.attenuation == Attenuation::reciprocal ? gpu::kFlagReciprocal : 0) |
                               (draw.sceneDepth != VK_NULL_HANDLE ? gpu::kFlagSceneDepth : 0);
   params.space = {sizes.axis, sizes.edge, sizes.inner, flags};
-  params.pool = {sizes.slotsX, sizes.slotsY, sizes.slots(), sizes.most};
+  params.pool = {log2Of(sizes.slotsX), log2Of(sizes.slotsY), sizes.slots(), sizes.most};
   params.limits = {static_cast<std::uint32_t>(draw.particles.size()), config.maxListEntries,
                    static_cast<std::uint32_t>(draw.volumes.size()), sizes.rounds};
-  params.picture = {(draw.width + 7) / 8, (draw.height + 7) / 8, number, 0};
+  params.picture = {(draw.width + 7) / 8, (draw.height + 7) / 8, number, sizes.cellBits()};
   return params;
 }
 

@@ -19,11 +19,15 @@
 #include <cstdint>
 #define BILLOW_P_U32 std::uint32_t
 #define BILLOW_P_CONST inline constexpr std::uint32_t
+#define BILLOW_P_VEC3(name) float name[3]
+#define BILLOW_P_VEC4(name) float name[4]
 #define BILLOW_P_SIZE(type, bytes) static_assert(sizeof(type) == (bytes), "layout of " #type)
 namespace billow::format {
 #else
 #define BILLOW_P_U32 uint
 #define BILLOW_P_CONST const uint
+#define BILLOW_P_VEC3(name) vec3 name
+#define BILLOW_P_VEC4(name) vec4 name
 #define BILLOW_P_SIZE(type, bytes)
 #endif
 
@@ -37,15 +41,15 @@ BILLOW_P_CONST kNoMap = 0xffffffffu;  // Particle.map: not displaced
 BILLOW_P_CONST kNoRow = 0xffffffffu;  // of a table
 
 struct Particle {
-  float center[3];     // world
-  float radius;        // of the bounding sphere, world units, > 0; 0: the particle is not there
-  float rotation[4];   // unit quaternion x y z w, own space to world
-  float shape[3];      // world units, by kind: radii (ellipsoid), half axis (capsule), half sides (box); sphere: unused
-  float displacement;  // share of the surface's distance that the map may take away, in [0, 1)
-  float diffuse[3];    // single-scattering albedo, linear RGB in [0, 1]
-  float extinction;    // per world unit where density is 1
-  float emission[3];   // radiance per world unit where density is 1, linear RGB
-  float age;           // share of its life, in [0, 1]
+  BILLOW_P_VEC3(center);    // world
+  float radius;             // of the bounding sphere, world units, > 0; 0: the particle is not there
+  BILLOW_P_VEC4(rotation);  // unit quaternion x y z w, own space to world
+  BILLOW_P_VEC3(shape);     // world units, by kind: radii (ellipsoid), half axis (capsule), half sides (box)
+  float displacement;       // share of the surface's distance that the map may take away, in [0, 1)
+  BILLOW_P_VEC3(diffuse);   // single-scattering albedo, linear RGB in [0, 1]
+  float extinction;         // per world unit where density is 1
+  BILLOW_P_VEC3(emission);  // radiance per world unit where density is 1, linear RGB
+  float age;                // share of its life, in [0, 1]
   BILLOW_P_U32 kind;
   BILLOW_P_U32 map;       // cube map number
   BILLOW_P_U32 material;  // ParticleMaterial number
