@@ -45,12 +45,12 @@ vec2 crossBox(Ray ray, vec3 low, vec3 high) {
 float interleavedNoise(vec2 pixel) { return fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715)))); }
 
 // One step of `edges` voxel edges, as the direct march has it; both values are per voxel edge.
-void shade(vec4 value, float depth, float edges, inout Sum sum) {
+void shade(vec4 value, float t, float edges, inout Sum sum) {
   const float opticalDepth = value.a * edges;
   const float after = exp(-opticalDepth);
   const float span = opticalDepth < 1e-3 ? edges * (1.0 - 0.5 * opticalDepth) : (1.0 - after) / value.a;
   sum.radiance += sum.transmittance * value.rgb * span;
-  sum.depth += sum.transmittance * (1.0 - after) * depth;
+  sum.depth += sum.transmittance * (1.0 - after) * t;
   sum.transmittance *= after;
 }
 
@@ -72,7 +72,7 @@ void marchBox(Ray ray, Steps steps, uint slot, vec3 corner, float next, float se
     const vec4 value = textureLod(lit, first + inCell * meta.texel.xyz, 0.0);
     // A step that crosses the scene counts for what lies before it.
     const float edges = min(steps.edges, max(steps.end - (k + steps.shift) * steps.edges, 0.0));
-    shade(value, t / ray.perDepth, edges, sum);
+    shade(value, t, edges, sum);
   }
 }
 
@@ -92,7 +92,7 @@ Sum march(Ray ray, float end, float shift, float seen) {
   while (k < last && sum.transmittance * seen > kOpaque) {
     const float t = (k + shift) * dt;
     const vec3 voxel = ray.origin + ray.direction * t;
-    const vec3 cell = clamp(floor(voxel / inner), vec3(box.low), vec3(box.high - 1u));
+    const vec3 cell = clamp(floor(voxel / inner), vec3(0.0), vec3(cellsAxis() - 1u));
     const vec3 corner = cell * inner;
     const uint slot = positionOf(uvec3(cell)) - range.x;
     vec3 low = corner;
@@ -110,6 +110,7 @@ Sum march(Ray ray, float end, float shift, float seen) {
     if (near && k < next) break;  // opaque
     k = next;
   }
+  sum.depth /= ray.perDepth;
   return sum;
 }
 
