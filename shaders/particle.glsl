@@ -55,14 +55,22 @@ vec3 sampleRamp(uint row, float r, float age) {
 // Share of the way from the middle to the surface before displacement.
 float shareOf(Particle particle, vec3 q) {
   const vec3 shape = particle.shape;
-  if (particle.kind == kKindSphere) return length(q) / particle.radius;
-  if (particle.kind == kKindEllipsoid) return length(q / shape);
-  if (particle.kind == kKindBox) {
+  const uint kind = kindIn(particle.kind);
+  if (kind == kKindSphere) return length(q) / particle.radius;
+  if (kind == kKindEllipsoid) return length(q / shape);
+  if (kind == kKindBox) {
     const vec3 sides = abs(q) / shape;
     return max(max(sides.x, sides.y), sides.z);
   }
   const float along = clamp(dot(q, shape) / max(dot(shape, shape), 1e-30), -1.0, 1.0);
   return length(q - along * shape) / (particle.radius - length(shape));
+}
+
+float displacementMap(Particle particle, vec3 q) {
+  if (particle.map == kNoMap) return 1.0;
+  const float first = sampleCube(firstMapIn(particle.map), q);
+  const float share = mapShareIn(particle.kind);
+  return share > 0.0 ? mix(first, sampleCube(secondMapIn(particle.map), q), share) : first;
 }
 
 float profileOf(ParticleMaterial material, float r) {
@@ -83,7 +91,7 @@ bool matterAt(Particle particle, ParticleMaterial material, vec3 apart, out Matt
   const vec3 q = rotated(turn, apart);
   const float s = shareOf(particle, q);
   if (!(s < 1.0)) return false;
-  const float m = particle.map == kNoMap ? 1.0 : sampleCube(particle.map, q);
+  const float m = displacementMap(particle, q);
   const float r = s / (1.0 - particle.displacement * (1.0 - m));
   if (!(r < 1.0)) return false;
   float density = profileOf(material, r) * clamp((1.0 - r) / material.softness, 0.0, 1.0);

@@ -202,7 +202,7 @@ class EffectRules {
     const std::uint64_t mapsEnd = std::uint64_t{emitter.firstMap} + emitter.mapCount;
     const bool maps = emitter.firstMap == kNoMap ? emitter.mapCount == 0
                                                  : emitter.mapCount >= 1 && emitter.mapCount <= kMaxAnimatedMaps &&
-                                                       mapsEnd <= tables_.maps.size();
+                                                       mapsEnd <= tables_.maps.size() && mapsEnd <= kMaxMaps;
     if (!maps) {
       sink_.report(Rule::effectReference, place,
                    fmt::format("{} maps from {} of {}.", emitter.mapCount, emitter.firstMap, tables_.maps.size()));

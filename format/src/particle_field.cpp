@@ -35,7 +35,7 @@ float surfaceShare(const Particle& particle, const Vec3& q) {
   constexpr float kOutside = 2;
   const Vec3 shape{particle.shape[0], particle.shape[1], particle.shape[2]};
   const auto ratio = [](float length, float whole) { return whole > 0 ? length / whole : kOutside; };
-  switch (particle.kind) {
+  switch (kindIn(particle.kind)) {
     case kKindSphere:
       return ratio(std::sqrt(dot(q, q)), particle.radius);
     case kKindEllipsoid: {
@@ -93,6 +93,12 @@ ParticleField::ParticleField(const EffectTables& tables) : tables_(tables) {
   for (const CubeMap& map : tables.maps) maps_.emplace_back(map);
 }
 
+float ParticleField::displacementMap(const Particle& particle, const std::array<float, 3>& q) const {
+  if (particle.map == kNoMap) return 1;
+  const float first = maps_[firstMapIn(particle.map)].sample(q), share = mapShareIn(particle.kind);
+  return share > 0 ? first + (maps_[secondMapIn(particle.map)].sample(q) - first) * share : first;
+}
+
 float ParticleField::profile(const ParticleMaterial& material, float r) const {
   if (material.profile == kProfileConstant) return 1;
   if (material.profile == kProfileRadial) return 1 - r * r;
@@ -106,7 +112,7 @@ ParticleSample ParticleField::sample(const Particle& particle, const std::array<
   const float share = surfaceShare(particle, q);
   if (!(share < 1)) return result;
   const ParticleMaterial& material = tables_.materials[particle.material];
-  const float m = particle.map == kNoMap ? 1 : maps_[particle.map].sample(q);
+  const float m = displacementMap(particle, q);
   const float r = share / (1 - particle.displacement * (1 - m));
   if (!(r < 1)) return result;
   const float fade = std::min((1 - r) / material.softness, 1.0f);

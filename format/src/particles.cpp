@@ -233,11 +233,17 @@ class EmitterRun {
     return turned(axis, turns);
   }
 
-  std::uint32_t map(const Dice& dice, double age) const {
-    if (emitter_.firstMap == kNoMap || emitter_.mapCount <= 1) return emitter_.firstMap;
-    const double count = emitter_.mapCount;
+  // The two maps between which the particle's displacement is.
+  void fillMaps(const Dice& dice, double age, Particle& result) const {
+    const std::uint32_t first = emitter_.firstMap, count = emitter_.mapCount;
+    result.kind = emitter_.kind;
+    result.map = first;
+    if (first == kNoMap || count <= 1) return;
     const double at = dice.draw(Draw::map) * count + age * static_cast<double>(emitter_.mapsPerSecond);
-    return emitter_.firstMap + static_cast<std::uint32_t>(at - std::floor(at / count) * count) % emitter_.mapCount;
+    const double whole = std::floor(at);
+    const auto index = static_cast<std::uint32_t>(whole - std::floor(whole / count) * count) % count;
+    result.kind = kindWithShare(emitter_.kind, static_cast<float>(at - whole));
+    result.map = (first + index) | (first + (index + 1) % count) << 16;
   }
 
   struct Motion {
@@ -292,7 +298,7 @@ class EmitterRun {
     const Quaternion turn = rotation(dice, share, motion.velocity);
     for (std::size_t i = 0; i < 4; ++i) result.rotation[i] = static_cast<float>(turn[i]);
     fillLook(dice, share, result);
-    result.map = map(dice, age);
+    fillMaps(dice, age, result);
     return result;
   }
 
@@ -313,7 +319,6 @@ class EmitterRun {
     const double taken = static_cast<double>(emitter_.displacement) * row(emitter_.displacementRow, share, 1);
     result.displacement = std::clamp(static_cast<float>(taken), 0.0f, 0.95f);
     result.age = static_cast<float>(share);
-    result.kind = emitter_.kind;
     result.material = emitter_.material;
     result.seed = dice.seed();
   }

@@ -290,17 +290,70 @@ TEST(ParticleField, KindsHaveTheirShapes) {
   EXPECT_FALSE(inside(box, 0, 1.1f, 0));
 }
 
+// The same value, in 255ths, in all directions.
+CubeMap evenMap(std::uint8_t value) {
+  CubeMap map{};
+  for (std::size_t b = 0; b < kCubeBytes; b += kBc4Bytes) map.blocks[b] = map.blocks[b + 1] = std::byte{value};
+  return map;
+}
+
 TEST(ParticleField, MapsPushTheSurfaceInward) {
   EffectTables tables = plainEffect();
-  CubeMap map{};
-  for (std::size_t b = 0; b < kCubeBytes; b += kBc4Bytes) map.blocks[b] = map.blocks[b + 1] = std::byte{51};  // 0.2
-  tables.maps.push_back(map);
+  tables.maps.push_back(evenMap(51));  // 0.2
   const ParticleField field(tables);
   Particle particle = unitParticle(kKindSphere);
   particle.map = 0;
   particle.displacement = 0.5f;  // surface at 2 * (1 - 0.5 * 0.8) = 1.2
   EXPECT_GT(field.sample(particle, {0, 1.19f, 0}).density, 0);
   EXPECT_EQ(field.sample(particle, {0, 1.21f, 0}).density, 0);
+}
+
+TEST(ParticleField, BetweenTwoMapsTheSurfaceIsBetweenTheirs) {
+  EffectTables tables = plainEffect();
+  tables.maps = {evenMap(0), evenMap(51), evenMap(255)};
+  const ParticleField field(tables);
+  Particle particle = unitParticle(kKindSphere);
+  particle.displacement = 0.5f;
+  particle.map = 1u | 2u << 16;
+  for (const float share : {0.0f, 0.25f, 0.5f, 0.999f, 1.0f}) {
+    particle.kind = kindWithShare(kKindSphere, share);
+    const float surface = 2 * (1 - 0.5f * (1 - (0.2f + 0.8f * share)));
+    EXPECT_GT(field.sample(particle, {0, surface - 0.001f, 0}).density, 0) << share;
+    EXPECT_EQ(field.sample(particle, {0, surface + 0.001f, 0}).density, 0) << share;
+  }
+}
+
+// Over a whole circle of maps, forward and backward, density changes no faster than the maps differ.
+TEST(ParticleField, MapsOfAnEmitterChangeSmoothly) {
+  for (const float speed : {1.5f, -1.5f}) {
+    EffectTables tables = plainEffect();
+    tables.maps = {evenMap(200), evenMap(0), evenMap(255), evenMap(100)};
+    tables.spans[0] = {0, 0, 0, 1};
+    tables.materials[0].softness = 1;
+    EmitterRecord& emitter = tables.emitters[0];
+    emitter.mapCount = 3;
+    emitter.firstMap = 1;
+    emitter.mapsPerSecond = speed;
+    emitter.displacement = 0.5f;
+    const ParticleField field(tables);
+    constexpr double kStep = 0.001;
+    double before = -1, least = 1, most = 0;
+    for (double time = 0; time < 1.999; time += kStep) {
+      const auto particles = particlesAt(tables, 0, time);
+      ASSERT_EQ(particles.size(), 1u);
+      EXPECT_GE(firstMapIn(particles[0].map), 1u);
+      EXPECT_GE(secondMapIn(particles[0].map), 1u);
+      const double density = static_cast<double>(field.sample(particles[0], {0.4f, 0, 0}).density);
+      // r = 0.4 / (0.5 + m / 2), so |dr / dm| is at most 0.8, and m changes by at most 1.5 a second.
+      const double change = before >= 0 ? std::abs(density - before) : 0;
+      EXPECT_LE(change, 0.8 * 1.5 * kStep + 1e-5) << time;
+      before = density;
+      least = std::min(least, density);
+      most = std::max(most, density);
+    }
+    EXPECT_NEAR(least, 1 - 0.4 / 0.5, 0.01) << "the darkest map was passed";
+    EXPECT_NEAR(most, 1 - 0.4, 0.01) << "the brightest map was passed";
+  }
 }
 
 TEST(ParticleField, ProfilesRampsAndErosion) {

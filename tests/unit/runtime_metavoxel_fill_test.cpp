@@ -116,7 +116,8 @@ TEST_F(MetavoxelFill, EveryKindIsWhatItsPlainEvaluationIs) {
     for (const bool rich : {false, true}) {
       Particle particle = richParticle(kind, rich ? kRich : kSoft);
       if (rich) {
-        particle.map = 1;
+        particle.map = 1u | 0u << 16;
+        particle.kind = format::kindWithShare(kind, 0.4f);
         particle.displacement = 0.5f;
       }
       const std::vector<Particle> particles{particle};

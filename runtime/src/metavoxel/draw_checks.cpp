@@ -44,9 +44,10 @@ const char* badParticle(const format::Particle& particle, std::size_t materials,
   for (const float at : particle.center) {
     if (!std::isfinite(at)) return "center";
   }
-  if (particle.kind >= format::kKindCount) return "kind";
+  if (format::kindIn(particle.kind) >= format::kKindCount) return "kind";
   if (particle.material >= materials) return "material";
-  return particle.map != format::kNoMap && particle.map >= maps ? "map" : nullptr;
+  if (particle.map == format::kNoMap) return nullptr;
+  return format::firstMapIn(particle.map) >= maps || format::secondMapIn(particle.map) >= maps ? "map" : nullptr;
 }
 
 }  // namespace billow::runtime

@@ -20,6 +20,7 @@ inline constexpr std::uint32_t kMaxCycleParticles = 1048576;       // born by an
 inline constexpr std::uint32_t kMaxEmitters = 64;                  // of an effect
 inline constexpr std::uint32_t kMaxSpans = 128;                    // of an emitter
 inline constexpr std::uint32_t kMaxAnimatedMaps = 64;              // of an emitter
+inline constexpr std::uint32_t kMaxMaps = 65535;                   // that emitters refer to: Particle.map has 16 bits
 inline constexpr float kMinDuration = 0.01f, kMaxDuration = 3600;  // seconds
 inline constexpr float kMaxLifetime = 600;                         // seconds
 inline constexpr float kMaxMagnitude = 1e6f;                       // of lengths, speeds, colours and values of tables
@@ -91,7 +92,7 @@ struct EmitterRecord {
   float displacement;
   std::uint32_t displacementRow;
   std::uint32_t firstMap;  // kNoMap: none
-  std::uint32_t mapCount;  // several: one after another, in a circle
+  std::uint32_t mapCount;  // several: from one to the next, in a circle
   float mapsPerSecond;
   std::uint32_t material;
   std::uint32_t track;  // kNoTrack: motion in closed form, by the numbers above

@@ -4,7 +4,8 @@
 // A primitive's density at a world point p, in [0, 1], times its extinction, is the extinction that it adds there:
 //   q       = inverse(rotation) * (p - center), the point in the primitive's own space
 //   s       = share of the way from the middle to the surface, before displacement (below), 0 inside to 1 on it
-//   surface = 1 - displacement * (1 - m), m in [0, 1] being the cube map's value in direction q (1 without a map)
+//   surface = 1 - displacement * (1 - m), m in [0, 1] being the value in direction q of two cube maps, linear between
+//             them in the second's share (1 without maps)
 //   r       = s / surface; density is 0 where r >= 1
 //   density = profile(r) * fade(r) * erosion(q), fade(r) = clamp((1 - r) / softness, 0, 1)
 // s by kind, with d = |q| / radius:
@@ -19,6 +20,7 @@
 #include <cstdint>
 #define BILLOW_P_U32 std::uint32_t
 #define BILLOW_P_CONST inline constexpr std::uint32_t
+#define BILLOW_P_FUNCTION inline
 #define BILLOW_P_VEC3(name) float name[3]
 #define BILLOW_P_VEC4(name) float name[4]
 #define BILLOW_P_SIZE(type, bytes) static_assert(sizeof(type) == (bytes), "layout of " #type)
@@ -26,6 +28,7 @@ namespace billow::format {
 #else
 #define BILLOW_P_U32 uint
 #define BILLOW_P_CONST const uint
+#define BILLOW_P_FUNCTION
 #define BILLOW_P_VEC3(name) vec3 name
 #define BILLOW_P_VEC4(name) vec4 name
 #define BILLOW_P_SIZE(type, bytes)
@@ -50,12 +53,31 @@ struct Particle {
   float extinction;         // per world unit where density is 1
   BILLOW_P_VEC3(emission);  // radiance per world unit where density is 1, linear RGB
   float age;                // share of its life, in [0, 1]
-  BILLOW_P_U32 kind;
-  BILLOW_P_U32 map;       // cube map number
-  BILLOW_P_U32 material;  // ParticleMaterial number
-  BILLOW_P_U32 seed;      // of what differs from particle to particle
+  BILLOW_P_U32 kind;        // kKind... in bits 0 to 7; share of the second map, in 2^-24ths, from bit 8 on
+  BILLOW_P_U32 map;         // numbers of two cube maps: bits 0 to 15 and 16 to 31; or kNoMap
+  BILLOW_P_U32 material;    // ParticleMaterial number
+  BILLOW_P_U32 seed;        // of what differs from particle to particle
 };
 BILLOW_P_SIZE(Particle, 96);
+
+// Particle.kind and Particle.map in their parts.
+BILLOW_P_FUNCTION BILLOW_P_U32 kindIn(BILLOW_P_U32 kind) {
+  return kind & 0xffu;
+}
+BILLOW_P_FUNCTION float mapShareIn(BILLOW_P_U32 kind) {
+  return float(kind >> 8) * (1.0f / 16777216.0f);
+}
+BILLOW_P_FUNCTION BILLOW_P_U32 firstMapIn(BILLOW_P_U32 map) {
+  return map & 0xffffu;
+}
+BILLOW_P_FUNCTION BILLOW_P_U32 secondMapIn(BILLOW_P_U32 map) {
+  return map >> 16;
+}
+// Particle.kind of a kind and a share in [0, 1].
+BILLOW_P_FUNCTION BILLOW_P_U32 kindWithShare(BILLOW_P_U32 kind, float share) {
+  BILLOW_P_U32 units = BILLOW_P_U32(share * 16777216.0f);
+  return kind | (units < 0xffffffu ? units : 0xffffffu) << 8;
+}
 
 // Curves are rows of kCurveSamples floats over [0, 1], ramps kRampRadii by kRampAges RGBA quadruples (radius fastest),
 // both read with linear interpolation between samples at i / (count - 1).

@@ -31,6 +31,7 @@ class ParticleField {
   ParticleSample sample(const Particle& particle, const std::array<float, 3>& point) const;
 
  private:
+  float displacementMap(const Particle& particle, const std::array<float, 3>& q) const;
   float profile(const ParticleMaterial& material, float r) const;
 
   const EffectTables& tables_;
