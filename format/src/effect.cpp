@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 
 namespace billow::format {
 namespace {
@@ -17,7 +18,48 @@ std::uint64_t bornWithin(const SpawnSpan& span, double from, double to) {
   return std::min<std::uint64_t>(span.count, static_cast<std::uint64_t>(share) + 2);
 }
 
+// Which of a span's particles may be alive `now` seconds into the run.
+std::pair<std::uint32_t, std::uint32_t> candidatesOf(const SpawnSpan& span, double longestLife, double now) {
+  const double begin = static_cast<double>(span.begin), length = static_cast<double>(span.end) - begin;
+  const double oldest = now - longestLife - begin, youngest = now - begin;
+  if (youngest < 0 || oldest > length) return {0, 0};
+  if (!(length > 0)) return {0, span.count};
+  const auto index = [&](double seconds) {
+    return static_cast<std::uint32_t>(std::clamp<double>(seconds / length * span.count, 0, span.count));
+  };
+  const std::uint32_t first = index(oldest);
+  return {first - std::min(first, 1u), std::min(index(youngest) + 1, span.count)};
+}
+
+// The first and last run in which an emitter's particles may be alive.
+std::pair<std::int64_t, std::int64_t> runsAt(const EffectRecord& effect, const EmitterRecord& emitter, double time) {
+  if ((effect.flags & kEffectLoop) == 0) return {0, 0};
+  const double duration = static_cast<double>(effect.duration), life = static_cast<double>(emitter.lifetime[1]);
+  const auto first = static_cast<std::int64_t>(std::floor((time - life) / duration)) - 1;
+  const bool warm = (effect.flags & kEffectPrewarm) != 0;
+  return {warm ? first : std::max<std::int64_t>(first, 0), static_cast<std::int64_t>(std::floor(time / duration))};
+}
+
 }  // namespace
+
+std::vector<Candidates> candidatesAt(const EffectTables& tables, std::uint32_t effect, double time) {
+  std::vector<Candidates> all;
+  if (!(time >= 0 && time <= kMaxEffectTime)) return all;
+  const EffectRecord& record = tables.effects[effect];
+  for (std::uint32_t e = 0; e < record.emitterCount; ++e) {
+    const EmitterRecord& emitter = tables.emitters[record.firstEmitter + e];
+    const auto [firstRun, lastRun] = runsAt(record, emitter, time);
+    for (std::int64_t run = firstRun; run <= lastRun; ++run) {
+      const double now = time - static_cast<double>(run) * static_cast<double>(record.duration);
+      for (std::uint32_t s = 0; s < emitter.spanCount; ++s) {
+        const auto [first, last] =
+            candidatesOf(tables.spans[emitter.firstSpan + s], static_cast<double>(emitter.lifetime[1]), now);
+        if (first < last) all.push_back({e, s, run, first, last});
+      }
+    }
+  }
+  return all;
+}
 
 std::uint64_t effectBytes(const EffectTables& tables) {
   const auto bytes = [](const auto& records) { return std::as_bytes(std::span(records)).size(); };

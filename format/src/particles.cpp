@@ -14,21 +14,6 @@ namespace {
 using Vec3 = std::array<double, 3>;
 using Quaternion = std::array<double, 4>;  // x y z w
 
-// What a particle's random numbers are for; never renumber.
-enum class Draw : std::uint32_t {
-  birth = 0,
-  lifetime = 1,
-  placeA = 2,  // three in a row
-  directionA = 5,
-  directionB = 6,
-  speed = 7,
-  radius = 8,
-  axisA = 9,
-  axisB = 10,
-  angle = 11,
-  map = 12,
-};
-
 // The random numbers of one particle.
 class Dice {
  public:
@@ -36,10 +21,8 @@ class Dice {
       : seed_(hashInteger(hashInteger(hashInteger(effectSeed) + emitter) + number)) {}
 
   std::uint32_t seed() const { return seed_; }
-  double draw(Draw what, std::uint32_t further = 0) const {
-    return static_cast<double>(unitOf(hashInteger(seed_ + static_cast<std::uint32_t>(what) + further)));
-  }
-  double between(Draw what, const float (&range)[2]) const {
+  double draw(std::uint32_t what) const { return static_cast<double>(unitOf(hashInteger(seed_ + what))); }
+  double between(std::uint32_t what, const float (&range)[2]) const {
     const double low = static_cast<double>(range[0]);
     return low + (static_cast<double>(range[1]) - low) * draw(what);
   }
@@ -106,22 +89,18 @@ class EmitterRun {
         number_(number),
         time_(time) {}
 
-  // Those of run `cycle` that are alive.
-  void append(std::int64_t cycle, std::vector<Particle>& into) const {
-    const double begin = static_cast<double>(cycle) * duration_;
-    const double now = time_ - begin;
+  // Those of the candidates that are alive.
+  void append(const Candidates& candidates, std::vector<Particle>& into) const {
+    const double now = time_ - static_cast<double>(candidates.run) * duration_;
     const std::uint32_t total = spans_.empty() ? 0 : spans_.back().first + spans_.back().count;
     // With a track, all runs are alike.
-    const std::uint32_t run = emitter_.track == kNoTrack ? static_cast<std::uint32_t>(cycle) : 0;
-    const std::uint32_t before = run * total;
-    for (const SpawnSpan& span : spans_) {
-      const auto [first, last] = candidates(span, now);
-      for (std::uint32_t i = first; i < last; ++i) {
-        const Dice dice(seed_, number_, before + span.first + i);
-        const Birth birth = birthOf(dice, span, i);
-        const double age = now - birth.time;
-        if (age >= 0 && age < birth.lifetime) into.push_back(particle(dice, birth, age));
-      }
+    const std::uint32_t run = emitter_.track == kNoTrack ? static_cast<std::uint32_t>(candidates.run) : 0;
+    const SpawnSpan& span = spans_[candidates.span];
+    for (std::uint32_t i = candidates.first; i < candidates.last; ++i) {
+      const Dice dice(seed_, number_, run * total + span.first + i);
+      const Birth birth = birthOf(dice, span, i);
+      const double age = now - birth.time;
+      if (age >= 0 && age < birth.lifetime) into.push_back(particle(dice, birth, age));
     }
   }
 
@@ -138,16 +117,13 @@ class EmitterRun {
   }
 
  private:
-  struct Range {
-    std::uint32_t first, last;
-  };
   // All of it but place and velocity.
   Birth birthOf(const Dice& dice, const SpawnSpan& span, std::uint32_t i) const {
-    const double share = (i + dice.draw(Draw::birth)) / span.count;
+    const double share = (i + dice.draw(kDrawBirth)) / span.count;
     const double from = static_cast<double>(span.begin);
     return {span.first + i,
             from + (static_cast<double>(span.end) - from) * share,
-            dice.between(Draw::lifetime, emitter_.lifetime),
+            dice.between(kDrawLifetime, emitter_.lifetime),
             {},
             {}};
   }
@@ -156,19 +132,6 @@ class EmitterRun {
     const Vec3 shift = offset(dice);
     for (std::size_t i = 0; i < 3; ++i) birth.position[i] += shift[i];
     birth.velocity = startVelocity(dice, birth.time);
-  }
-
-  // Which of a span's particles may be alive `now` seconds into the run: a few too many.
-  Range candidates(const SpawnSpan& span, double now) const {
-    const double begin = static_cast<double>(span.begin), length = static_cast<double>(span.end) - begin;
-    const double oldest = now - static_cast<double>(emitter_.lifetime[1]) - begin, youngest = now - begin;
-    if (youngest < 0 || oldest > length) return {0, 0};
-    if (!(length > 0)) return {0, span.count};
-    const auto index = [&](double seconds) {
-      return static_cast<std::uint32_t>(std::clamp<double>(seconds / length * span.count, 0, span.count));
-    };
-    const std::uint32_t first = index(oldest);
-    return {first - std::min(first, 1u), std::min(index(youngest) + 1, span.count)};
   }
 
   double row(std::uint32_t index, double x, double absent) const {
@@ -196,7 +159,7 @@ class EmitterRun {
 
   // In the shape, relative to its middle.
   Vec3 offset(const Dice& dice) const {
-    const double a = dice.draw(Draw::placeA), b = dice.draw(Draw::placeA, 1), c = dice.draw(Draw::placeA, 2);
+    const double a = dice.draw(kDrawPlace), b = dice.draw(kDrawPlace + 1), c = dice.draw(kDrawPlace + 2);
     const Vec3 extent = vec(emitter_.extent);
     switch (static_cast<EmitterShape>(emitter_.shape)) {
       case EmitterShape::point:
@@ -214,10 +177,10 @@ class EmitterRun {
   }
 
   Vec3 startVelocity(const Dice& dice, double born) const {
-    const Vec3 cone = coneDirection(static_cast<double>(emitter_.spreadCosine), dice.draw(Draw::directionA),
-                                    dice.draw(Draw::directionB));
+    const Vec3 cone = coneDirection(static_cast<double>(emitter_.spreadCosine), dice.draw(kDrawDirection),
+                                    dice.draw(kDrawDirection + 1));
     Vec3 start = around(vec(emitter_.direction), cone);
-    const double speed = dice.between(Draw::speed, emitter_.speed);
+    const double speed = dice.between(kDrawSpeed, emitter_.speed);
     const Vec3 own = velocity(born);
     for (std::size_t i = 0; i < 3; ++i)
       start[i] = start[i] * speed + own[i] * static_cast<double>(emitter_.inheritance);
@@ -226,10 +189,10 @@ class EmitterRun {
 
   Quaternion rotation(const Dice& dice, double share, const Vec3& speed) const {
     double turns = row(emitter_.rotationRow, share, 0);
-    if ((emitter_.flags & kEmitterRandomStart) != 0) turns += dice.draw(Draw::angle);
+    if ((emitter_.flags & kEmitterRandomStart) != 0) turns += dice.draw(kDrawAngle);
     if ((emitter_.flags & kEmitterAlign) != 0) return product(alongVelocity(speed), turned({1, 0, 0}, turns));
     Vec3 axis = vec(emitter_.axis);
-    if (axis == Vec3{0, 0, 0}) axis = coneDirection(-1, dice.draw(Draw::axisA), dice.draw(Draw::axisB));
+    if (axis == Vec3{0, 0, 0}) axis = coneDirection(-1, dice.draw(kDrawAxis), dice.draw(kDrawAxis + 1));
     return turned(axis, turns);
   }
 
@@ -239,7 +202,7 @@ class EmitterRun {
     result.kind = emitter_.kind;
     result.map = first;
     if (first == kNoMap || count <= 1) return;
-    const double at = dice.draw(Draw::map) * count + age * static_cast<double>(emitter_.mapsPerSecond);
+    const double at = dice.draw(kDrawMap) * count + age * static_cast<double>(emitter_.mapsPerSecond);
     const double whole = std::floor(at);
     const auto index = static_cast<std::uint32_t>(whole - std::floor(whole / count) * count) % count;
     result.kind = kindWithShare(emitter_.kind, static_cast<float>(at - whole));
@@ -303,7 +266,7 @@ class EmitterRun {
   }
 
   void fillLook(const Dice& dice, double share, Particle& result) const {
-    const double radius = dice.between(Draw::radius, emitter_.radius) * row(emitter_.radiusRow, share, 1);
+    const double radius = dice.between(kDrawRadius, emitter_.radius) * row(emitter_.radiusRow, share, 1);
     const double opacity = row(emitter_.opacityRow, share, 1);
     result.radius = static_cast<float>(std::max(0.0, radius));
     result.extinction = static_cast<float>(static_cast<double>(emitter_.extinction) * std::max(0.0, opacity));
@@ -340,19 +303,9 @@ std::vector<Birth> birthsOf(const EffectTables& tables, const EffectRecord& effe
 
 std::vector<Particle> particlesAt(const EffectTables& tables, std::uint32_t effect, double time) {
   std::vector<Particle> particles;
-  if (!(time >= 0 && time <= kMaxEffectTime)) return particles;
   const EffectRecord& record = tables.effects[effect];
-  const double duration = static_cast<double>(record.duration);
-  for (std::uint32_t e = 0; e < record.emitterCount; ++e) {
-    const EmitterRun run(tables, record, e, time);
-    std::int64_t first = 0, last = 0;
-    if ((record.flags & kEffectLoop) != 0) {
-      const double life = static_cast<double>(tables.emitters[record.firstEmitter + e].lifetime[1]);
-      first = static_cast<std::int64_t>(std::floor((time - life) / duration)) - 1;
-      last = static_cast<std::int64_t>(std::floor(time / duration));
-      if ((record.flags & kEffectPrewarm) == 0) first = std::max<std::int64_t>(first, 0);
-    }
-    for (std::int64_t cycle = first; cycle <= last; ++cycle) run.append(cycle, particles);
+  for (const Candidates& candidates : candidatesAt(tables, effect, time)) {
+    EmitterRun(tables, record, candidates.emitter, time).append(candidates, particles);
   }
   return particles;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "billow/format/cube_map.h"
+#include "billow/format/emitter.h"
 #include "billow/format/layout.h"
 #include "billow/format/particle.h"
 #include "billow/format/track.h"
@@ -52,54 +53,6 @@ struct SpawnSpan {
 };
 static_assert(sizeof(SpawnSpan) == 16);
 
-enum class EmitterShape : std::uint32_t { point = 0, sphere = 1, box = 2 };
-inline constexpr std::uint32_t kEmitterShapeCount = 3;
-
-inline constexpr std::uint32_t kEmitterAlign = 1;        // EmitterRecord.flags: own x axis along the velocity
-inline constexpr std::uint32_t kEmitterRandomStart = 2;  // rotation begins anywhere
-
-// Rows are of CURV, or kNoRow for 1 (position and rotation: 0); three rows are consecutive. Those of a life are read at
-// a particle's age / lifetime, those of the position at time / duration.
-struct EmitterRecord {
-  StringRef name;
-  std::uint32_t firstSpan;
-  std::uint32_t spanCount;
-  std::uint32_t flags;
-  std::uint32_t shape;  // EmitterShape
-  float extent[3];      // sphere: radius, share of the radius that is hollow, 0; box: half sides; point: 0
-  float position[3];
-  std::uint32_t positionRow;  // of three, added to `position`
-  float inheritance;          // share of the emitter's own velocity that particles begin with
-  float lifetime[2];          // seconds, least and most
-  float direction[3];         // unit
-  float spreadCosine;         // of the half angle around it
-  float speed[2];
-  float gravity[3];
-  float drag;  // 1 / second
-  float wind[3];
-  std::uint32_t kind;  // of the particles, below: kKind...
-  float radius[2];
-  std::uint32_t radiusRow;
-  float proportions[3];  // Particle.shape over the radius
-  float extinction;      // 1 / world unit
-  std::uint32_t opacityRow;
-  float diffuse[3];
-  std::uint32_t diffuseRow;  // of three
-  float emission[3];
-  std::uint32_t emissionRow;  // of three
-  float axis[3];              // of rotation, unit; 0 0 0: a random one for each particle
-  std::uint32_t rotationRow;  // turns
-  float displacement;
-  std::uint32_t displacementRow;
-  std::uint32_t firstMap;  // kNoMap: none
-  std::uint32_t mapCount;  // several: from one to the next, in a circle
-  float mapsPerSecond;
-  std::uint32_t material;
-  std::uint32_t track;  // kNoTrack: motion in closed form, by the numbers above
-  std::uint32_t reserved[7];
-};
-static_assert(sizeof(EmitterRecord) == 256);
-
 struct CurveRow {
   float values[kCurveSamples];
 };
@@ -134,6 +87,18 @@ float sampleCurve(const CurveRow& row, float x);
 std::uint64_t mostAlive(const EmitterRecord& emitter, std::span<const SpawnSpan> spans, float duration, bool loop);
 // Of all emitters of an effect.
 std::uint64_t mostAlive(const EffectTables& tables, const EffectRecord& effect);
+
+// Particles first to last - 1 of a span: all that may be alive at a time, and a few that are not.
+struct Candidates {
+  std::uint32_t emitter;  // of the effect
+  std::uint32_t span;     // of the emitter
+  std::int64_t run;       // of the effect, which begins at run * duration
+  std::uint32_t first, last;
+};
+// Those of an effect `time` seconds after its begin, in [0, kMaxEffectTime], else none; by emitter, run and span,
+// without empty ones. Uses the tables of effects, emitters and spans alone. The work is that of spans and runs, not of
+// particles.
+std::vector<Candidates> candidatesAt(const EffectTables& tables, std::uint32_t effect, double time);
 
 // How a particle sets out.
 struct Birth {

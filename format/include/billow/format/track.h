@@ -9,7 +9,6 @@
 
 namespace billow::format {
 
-inline constexpr std::uint32_t kNoTrack = 0xffffffffu;          // EmitterRecord.track: motion in closed form
 inline constexpr std::uint32_t kMaxTrackPoints = 1u << 22;      // of all tracks of a pack
 inline constexpr std::uint32_t kMaxTrackFrames = 1u << 16;      // of a track
 inline constexpr float kMinTrackRate = 1, kMaxTrackRate = 240;  // frames a second
