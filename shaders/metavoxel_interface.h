@@ -53,6 +53,18 @@ struct MetavoxelCounters {
 };
 BILLOW_GPU_SIZE(MetavoxelCounters, 80);
 
+// Candidates of one span in one run of an effect's emitter, as the effect lies in the world. A candidate's slot is its
+// number here plus a random one in [0, 1).
+struct SpawnJob {
+  uvec4 numbers;  // of its first particle in the draw; emitter; the first candidate's among all runs; emitter's hash
+  vec4 times;     // age of one born at slot 0, seconds a slot; its birth as a share of the duration, the same a slot
+  vec4 moments;   // seconds since the track's frame before and until that after; samples of a position row a second; 0
+  uvec4 points;   // first point and count of the track's frame before, and of that after
+  vec4 turn;      // quaternion, effect to world
+  vec4 origin;    // of the emitter's position, world - centre; w: scale
+};
+BILLOW_GPU_SIZE(SpawnJob, 96);
+
 struct MetavoxelParams {
   vec4 toVoxel[3];       // rows: voxel = dot(row.xyz, world - centre) + row.w
   vec4 toWorld[3];       // world step of a voxel along each axis of the space; w: middle of the space, in voxels
@@ -74,8 +86,10 @@ struct MetavoxelParams {
   uvec4 ramps;    // addresses: ramps; counters
   uvec4 rounds;   // addresses: rounds; what the pool's blocks of texels hold
   uvec4 work;     // addresses: work items of volumes; of particles (metavoxel_work.glsl)
+  uvec4 emitters;  // addresses: emitters; points of tracks
+  uvec4 spawn;     // address of jobs; their number; candidates, the last of the particles
 };
-BILLOW_GPU_SIZE(MetavoxelParams, 27 * 16);
+BILLOW_GPU_SIZE(MetavoxelParams, 29 * 16);
 
 #ifdef __cplusplus
 }  // namespace billow::runtime::gpu

@@ -115,15 +115,16 @@ struct Painter {
   std::unique_ptr<runtime::Renderer> renderer;
   std::optional<MetavoxelPainter> metavoxels;
 
-  runtime::Result<headless::Picture> render(const runtime::DrawInfo& draw, const Particles& particles) {
-    auto picture = metavoxels ? metavoxels->render(*gpu, *renderer, draw, particles) : gpu->render(*renderer, draw);
+  runtime::Result<headless::Picture> render(const runtime::DrawInfo& draw, const Effects& effects) {
+    auto picture = metavoxels ? metavoxels->render(*gpu, *renderer, draw, effects) : gpu->render(*renderer, draw);
     gpu->waitIdle();
     return picture;
   }
 };
 
-// `box` and `lattice` are those of what metavoxels will hold.
-Checked<Painter> makePainter(const Job& job, const runtime::WorldBox& box, VoxelLattice lattice) {
+// `box`, `lattice` and the number of particles are those of what metavoxels will hold.
+Checked<Painter> makePainter(const Job& job, const runtime::WorldBox& box, VoxelLattice lattice,
+                             std::uint64_t particles) {
   Painter painter;
   auto gpu = headless::Headless::create({.device = job.request.device});
   if (!gpu) return tl::unexpected(toRefusal(gpu.error(), job.request.pack));
@@ -134,7 +135,8 @@ Checked<Painter> makePainter(const Job& job, const runtime::WorldBox& box, Voxel
   if (job.request.method == Method::direct) return painter;
   if (job.request.voxelSize) lattice.edge = *job.request.voxelSize;
   // The other half is for the frame and its staging memory.
-  auto metavoxels = MetavoxelPainter::make(*painter.renderer, job.pack, box, lattice, job.request.gpuBudget / 2);
+  auto metavoxels =
+      MetavoxelPainter::make(*painter.renderer, job.pack, box, lattice, particles, job.request.gpuBudget / 2);
   if (!metavoxels) return tl::unexpected(toRefusal(metavoxels.error(), job.request.pack));
   painter.metavoxels = std::move(*metavoxels);
   return painter;
@@ -147,11 +149,11 @@ Checked<void> save(const Job& job, const runtime::Result<headless::Picture>& pic
 }
 
 Checked<void> renderFrame(const Job& job, Painter& painter, runtime::DrawInfo draw, std::uint32_t index,
-                          const Particles& particles) {
+                          const Effects& effects) {
   const auto frame = painter.renderer->upload(job.pack, job.volume, index, {.grids = job.grids});
   if (!frame) return tl::unexpected(toRefusal(frame.error(), job.request.pack));
   draw.frame = frame->get();
-  const auto picture = painter.render(draw, particles);
+  const auto picture = painter.render(draw, effects);
   return save(job, picture, outputName(job.request, job.pack.framesOf(job.record())[index].number));
 }
 
@@ -161,19 +163,21 @@ Checked<void> renderFrames(const Job& job) {
   // The camera frames the whole sequence, so that a frame alone and within a range are the same picture.
   Stage stage = stageOf(job.pack, job.record(), job.grids, *look, 0, job.record().frameCount - 1);
   const auto frames = job.pack.framesOf(job.record());
-  std::vector<Particles> particles;
+  std::vector<Effects> effects;
+  std::uint64_t particles = 0;
   for (const std::uint32_t index : job.frames) {
-    particles.push_back(particlesOf(job.pack, job.effects, frames[index].time));
-    addParticles(particles.back(), stage.box);
+    effects.push_back(effectsAt(job.effects, frames[index].time));
+    addParticles(particlesOf(job.pack, effects.back()), stage.box);
+    particles = std::max(particles, mostParticles(job.pack, effects.back()));
   }
   const runtime::DrawInfo draw = setUp(job.request, stage, *look, job.png);
-  auto painter = makePainter(job, stage.box, finestVoxels(job.pack, job.record(), job.grids));
+  auto painter = makePainter(job, stage.box, finestVoxels(job.pack, job.record(), job.grids), particles);
   if (!painter) return tl::unexpected(painter.error());
   // No prepare(): it builds the pipelines of every frame ahead, so that none is late. Here nobody waits for a frame,
   // and those that the chosen frames need are built when they are met.
   const bool progress = job.frames.size() > 1 && isatty(STDERR_FILENO) != 0;
   for (std::size_t i = 0; i < job.frames.size(); ++i) {
-    if (auto done = renderFrame(job, *painter, draw, job.frames[i], particles[i]); !done) return done;
+    if (auto done = renderFrame(job, *painter, draw, job.frames[i], effects[i]); !done) return done;
     if (progress)
       fmt::print(stderr, "\r{}/{} frames on {}{}", i + 1, job.frames.size(), painter->gpu->deviceName(),
                  i + 1 == job.frames.size() ? "\n" : "");
@@ -183,7 +187,8 @@ Checked<void> renderFrames(const Job& job) {
 
 // Effects without a volume, at one time.
 Checked<void> renderEffects(const Job& job) {
-  const Particles particles = particlesOf(job.pack, job.effects, *job.request.time);
+  const Effects effects = effectsAt(job.effects, *job.request.time);
+  const Particles particles = particlesOf(job.pack, effects);
   Stage stage{.box = {}, .up = 'y', .burning = false, .ambientGiven = false};
   addParticles(particles, stage.box);
   for (const format::Particle& particle : particles) {
@@ -192,9 +197,9 @@ Checked<void> renderEffects(const Job& job) {
   runtime::Look look;
   look.scatteringOrders = 4;
   const runtime::DrawInfo draw = setUp(job.request, stage, look, job.png);
-  auto painter = makePainter(job, stage.box, {});
+  auto painter = makePainter(job, stage.box, {}, mostParticles(job.pack, effects));
   if (!painter) return tl::unexpected(painter.error());
-  return save(job, painter->render(draw, particles), job.request.output);
+  return save(job, painter->render(draw, effects), job.request.output);
 }
 
 // The volume, its grids and frames that are asked for.

@@ -14,6 +14,7 @@ namespace {
 constexpr std::uint32_t kEdge = 32, kInner = kEdge - 2;  // texels of a metavoxel
 constexpr std::uint32_t kMostMetavoxels = 16384;         // occupied
 constexpr std::uint32_t kMostEntries = 1u << 22;
+constexpr std::uint32_t kMostParticles = 1u << 20;
 constexpr std::uint32_t kMostAlong = 128;
 constexpr double kDefaultVoxels = 256;  // along the box's longest edge
 
@@ -42,13 +43,29 @@ Checked<std::vector<std::uint32_t>> findEffects(const format::Pack& pack, const 
   return found;
 }
 
-Particles particlesOf(const format::Pack& pack, const std::vector<std::uint32_t>& effects, double time) {
+Effects effectsAt(const std::vector<std::uint32_t>& effects, double time) {
+  Effects all;
+  for (const std::uint32_t effect : effects) all.push_back({.effect = effect, .time = time});
+  return all;
+}
+
+Particles particlesOf(const format::Pack& pack, const Effects& effects) {
   Particles all;
-  for (const std::uint32_t effect : effects) {
-    const Particles alive = format::particlesAt(pack.effects(), effect, time);
+  for (const runtime::MetavoxelEffect& effect : effects) {
+    const Particles alive = format::particlesAt(pack.effects(), effect.effect, effect.time);
     all.insert(all.end(), alive.begin(), alive.end());
   }
   return all;
+}
+
+std::uint64_t mostParticles(const format::Pack& pack, const Effects& effects) {
+  std::uint64_t sum = 0;
+  for (const runtime::MetavoxelEffect& effect : effects) {
+    for (const auto& candidates : format::candidatesAt(pack.effects(), effect.effect, effect.time)) {
+      sum += candidates.last - candidates.first;
+    }
+  }
+  return sum;
 }
 
 void addParticles(const Particles& particles, runtime::WorldBox& box) {
@@ -82,7 +99,7 @@ VoxelLattice finestVoxels(const format::Pack& pack, const format::VolumeRecord& 
 
 runtime::Result<MetavoxelPainter> MetavoxelPainter::make(runtime::Renderer& renderer, const format::Pack& pack,
                                                          const runtime::WorldBox& box, const VoxelLattice& lattice,
-                                                         std::uint64_t memoryBudget) {
+                                                         std::uint64_t particles, std::uint64_t memoryBudget) {
   double diagonal = 0, longest = 0;
   MetavoxelPainter painter;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -104,7 +121,7 @@ runtime::Result<MetavoxelPainter> MetavoxelPainter::make(runtime::Renderer& rend
                  .metavoxels = static_cast<std::uint32_t>(std::clamp(along, 1.0, double{kMostAlong})),
                  .memoryBudget = memoryBudget,
                  .maxMetavoxels = kMostMetavoxels,
-                 .maxParticles = format::kMaxAlive,
+                 .maxParticles = static_cast<std::uint32_t>(std::min<std::uint64_t>(particles, kMostParticles)),
                  .maxListEntries = kMostEntries,
                  .maxVolumes = 1,
                  .recordsInFlight = 1,
@@ -115,7 +132,7 @@ runtime::Result<MetavoxelPainter> MetavoxelPainter::make(runtime::Renderer& rend
 }
 
 runtime::Result<headless::Picture> MetavoxelPainter::render(headless::Headless& gpu, runtime::Renderer& renderer,
-                                                            const runtime::DrawInfo& draw, const Particles& particles) {
+                                                            const runtime::DrawInfo& draw, const Effects& effects) {
   const runtime::MetavoxelVolume volume{.frame = draw.frame, .look = draw.look};
   runtime::MetavoxelDraw info;
   info.view = draw.view;
@@ -126,7 +143,7 @@ runtime::Result<headless::Picture> MetavoxelPainter::render(headless::Headless& 
   info.anchor = anchor_;
   info.voxelSize = voxelSize_;
   if (draw.frame != nullptr) info.volumes = {&volume, 1};
-  info.particles = particles;
+  info.effects = effects;
   info.step = draw.quality.step;
   info.background = draw.background;
   info.width = draw.width;

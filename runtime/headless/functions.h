@@ -24,6 +24,7 @@
   X(vkBeginCommandBuffer)          \
   X(vkBindBufferMemory)            \
   X(vkBindImageMemory)             \
+  X(vkCmdCopyBuffer)               \
   X(vkCmdCopyBufferToImage)        \
   X(vkCmdCopyImageToBuffer)        \
   X(vkCmdPipelineBarrier2)         \

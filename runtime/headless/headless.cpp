@@ -94,6 +94,29 @@ class HeadlessImpl final : public Headless {
     return std::vector<float>(out.mapped, out.mapped + texels);
   }
 
+  Result<std::vector<format::Particle>> readParticles(runtime::Renderer& renderer,
+                                                      const runtime::Metavoxels& metavoxels) override {
+    const runtime::MetavoxelParticles particles = metavoxels.particles();
+    std::vector<format::Particle> all(particles.count);
+    if (all.empty()) return all;
+    const VkDeviceSize bytes = all.size() * sizeof(format::Particle);
+    Target out(device_);
+    if (auto done = out.makeBuffer(bytes, VK_BUFFER_USAGE_TRANSFER_DST_BIT); !done) return tl::unexpected(done.error());
+    beginCommands();
+    const VkBufferCopy copy{particles.offset, 0, bytes};
+    device_.vk.vkCmdCopyBuffer(commands_, particles.buffer, out.buffer, 1, &copy);
+    barrier(VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_2_HOST_BIT,
+            VK_ACCESS_2_HOST_READ_BIT);
+    if (auto done = submitAndWait(renderer, 0); !done) return tl::unexpected(done.error());
+    std::memcpy(all.data(), out.mapped, bytes);
+    for (format::Particle& particle : all) {
+      for (std::size_t i = 0; i < 3; ++i) {
+        particle.center[i] = static_cast<float>(double{particle.center[i]} + particles.center[i]);
+      }
+    }
+    return all;
+  }
+
   Result<std::vector<double>> time(runtime::Renderer& renderer, runtime::DrawInfo draw, std::uint32_t count) override {
     std::vector<double> milliseconds;
     const auto record = [&]() -> Result<void> {

@@ -23,6 +23,7 @@ using std::uint32_t;
 #include "metavoxel_rank.spv.h"
 #include "metavoxel_reset.spv.h"
 #include "metavoxel_shadow.spv.h"
+#include "metavoxel_spawn.spv.h"
 #include "metavoxel_sum.spv.h"
 #include "voxels.spv.h"
 }  // namespace billow::runtime::spirv

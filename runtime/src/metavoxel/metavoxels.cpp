@@ -11,6 +11,7 @@
 #include "pipelines.h"
 #include "resources.h"
 #include "space.h"
+#include "spawn.h"
 
 namespace billow::runtime {
 namespace {
@@ -18,7 +19,7 @@ namespace {
 class MetavoxelsImpl final : public Metavoxels {
  public:
   MetavoxelsImpl(Device& device, const MetavoxelConfig& config)
-      : device_(device), config_(config), resources_(device), pipelines_(device, config) {
+      : device_(device), config_(config), planner_(config.tables), resources_(device), pipelines_(device, config) {
     if (config.tables != nullptr) {
       materials_ = config.tables->materials.size();
       maps_ = config.tables->maps.size();
@@ -41,6 +42,7 @@ class MetavoxelsImpl final : public Metavoxels {
       next_ = (next_ + 1) % config_.recordsInFlight;
       ++draws_;
       space_ = steps->space;
+      particles_ = steps->particles;
       return {};
     });
   }
@@ -73,6 +75,12 @@ class MetavoxelsImpl final : public Metavoxels {
     }
     return shadow;
   }
+  MetavoxelParticles particles() const override {
+    return {.buffer = resources_.arrays.handle(),
+            .offset = resources_.sizes().regions.particles,
+            .count = particles_,
+            .center = space_.center};
+  }
   std::uint32_t poolSlots() const override { return resources_.sizes().slots(); }
   std::uint64_t bytesAllocated() const override { return resources_.bytes(); }
 
@@ -85,16 +93,23 @@ class MetavoxelsImpl final : public Metavoxels {
   struct Steps {  // a draw's pipelines and volumes, all made before anything is recorded
     Space space;
     std::vector<VolumeSteps> volumes;
-    VkPipeline clear, reset, binCount, binWrite, plan, rank, blocks, fill, sum, light, shadow, march, finish;
+    SpawnPlan spawns;
+    std::uint32_t particles;  // the host's and the effects'
+    VkPipeline clear, reset, spawn, binCount, binWrite, plan, rank, blocks, fill, sum, light, shadow, march, finish;
   };
 
   Result<Steps> prepare(const MetavoxelDraw& draw) {
     Steps steps{};
     steps.space = spaceOf(draw, resources_.sizes());
+    auto spawns = planner_.plan(draw, steps.space.center, config_.maxParticles);
+    if (!spawns) return tl::unexpected(spawns.error());
+    steps.spawns = std::move(*spawns);
+    steps.particles = static_cast<std::uint32_t>(draw.particles.size()) + steps.spawns.candidates;
     const bool half = draw.colorFormat == ColorFormat::half;
     using enum MetavoxelPass;
     const std::pair<MetavoxelPass, VkPipeline*> wanted[] = {{clear, &steps.clear},
                                                             {reset, &steps.reset},
+                                                            {spawn, &steps.spawn},
                                                             {binCount, &steps.binCount},
                                                             {binWrite, &steps.binWrite},
                                                             {plan, &steps.plan},
@@ -138,6 +153,8 @@ class MetavoxelsImpl final : public Metavoxels {
   Result<void> write(const MetavoxelDraw& draw, const Steps& steps) {
     const MetavoxelUpload upload = resources_.uploadOf(next_);
     if (auto written = writeParticles(draw, steps.space, upload.particles); !written) return written;
+    for (std::size_t i = 0; i < steps.spawns.jobs.size(); ++i)
+      put(jobsAt(draw) + i * sizeof(gpu::SpawnJob), steps.spawns.jobs[i]);
     put(upload.view, viewOf(draw));
     for (std::size_t i = 0; i < steps.volumes.size(); ++i) {
       if (steps.volumes[i].drawn()) put(upload.volumes + i * kMarchStride, steps.volumes[i].placed->params);
@@ -156,6 +173,11 @@ class MetavoxelsImpl final : public Metavoxels {
     params.ramps = both(r.ramps, r.counters);
     params.rounds = both(r.rounds, r.blocks);
     params.work = both(r.volumeWork, r.fillWork);
+    params.limits.x = steps.particles;
+    params.emitters = both(r.emitters, r.points);
+    params.spawn = both(r.jobs, 0);
+    params.spawn.z = static_cast<std::uint32_t>(steps.spawns.jobs.size());
+    params.spawn.w = steps.spawns.candidates;
     put(upload.space, params);
     pipelines_.write(resources_, next_, draw);
     return {};
@@ -164,6 +186,12 @@ class MetavoxelsImpl final : public Metavoxels {
   template <class T>
   void put(std::uint64_t at, const T& value) {
     std::memcpy(resources_.uploads.mapped().subspan(at, sizeof(T)).data(), &value, sizeof(T));
+  }
+
+  // Offset of the jobs in the memory that the host writes. None is empty or larger than a particle, so there is room.
+  std::uint64_t jobsAt(const MetavoxelDraw& draw) const {
+    static_assert(sizeof(gpu::SpawnJob) <= sizeof(format::Particle));
+    return resources_.uploadOf(next_).particles + draw.particles.size_bytes();
   }
 
   Result<void> writeParticles(const MetavoxelDraw& draw, const Space& space, std::uint64_t at) {
@@ -184,7 +212,7 @@ class MetavoxelsImpl final : public Metavoxels {
     const std::uint32_t rounds = resources_.sizes().rounds;
     stamp(commands, draw, 0);
     recordBegin(commands, draw, steps);
-    recordBin(commands, draw, steps);
+    recordBin(commands, steps);
     stamp(commands, draw, 1);
     for (std::uint32_t round = 0; round < rounds; ++round) recordRound(commands, draw, steps, round, rounds);
     if (rounds > 1) {
@@ -215,11 +243,18 @@ class MetavoxelsImpl final : public Metavoxels {
       const VkBufferCopy copy{resources_.uploadOf(next_).particles, regions.particles, draw.particles.size_bytes()};
       device_.api.vkCmdCopyBuffer(commands, resources_.uploads.handle(), arrays, 1, &copy);
     }
+    if (!steps.spawns.jobs.empty()) {
+      const VkBufferCopy copy{jobsAt(draw), regions.jobs, steps.spawns.jobs.size() * sizeof(gpu::SpawnJob)};
+      device_.api.vkCmdCopyBuffer(commands, resources_.uploads.handle(), arrays, 1, &copy);
+    }
+    barrier(commands);
+    if (steps.spawns.jobs.empty()) return;
+    dispatch(commands, steps.spawn, {}, {(steps.spawns.candidates + 63) / 64, 1, 1});
     barrier(commands);
   }
 
-  void recordBin(VkCommandBuffer commands, const MetavoxelDraw& draw, const Steps& steps) {
-    const auto particles = static_cast<std::uint32_t>(draw.particles.size());
+  void recordBin(VkCommandBuffer commands, const Steps& steps) {
+    const std::uint32_t particles = steps.particles;
     const std::uint64_t rank = resources_.sizes().regions.counters + offsetof(gpu::MetavoxelCounters, rank);
     if (particles != 0) dispatch(commands, steps.binCount, {}, {particles, 1, 1});
     for (std::uint32_t i = 0; i < steps.volumes.size(); ++i) {
@@ -306,11 +341,13 @@ class MetavoxelsImpl final : public Metavoxels {
   Device& device_;
   MetavoxelConfig config_;
   std::size_t materials_ = 0, maps_ = 0;
+  SpawnPlanner planner_;
   MetavoxelResources resources_;
   MetavoxelPipelines pipelines_;
-  std::uint32_t next_ = 0;   // of the draws in flight
-  std::uint32_t draws_ = 0;  // recorded so far
-  Space space_{};            // of the last one
+  std::uint32_t next_ = 0;       // of the draws in flight
+  std::uint32_t draws_ = 0;      // recorded so far
+  Space space_{};                // of the last one
+  std::uint32_t particles_ = 0;  // of the last one
 };
 
 }  // namespace

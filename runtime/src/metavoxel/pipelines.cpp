@@ -14,12 +14,13 @@ using Code = std::span<const std::uint32_t>;
 
 // In the order of MetavoxelPass.
 Code codeOf(MetavoxelPass pass) {
-  static const Code codes[] = {spirv::kMetavoxelClear,      spirv::kMetavoxelReset,       spirv::kMetavoxelBin,
-                               spirv::kMetavoxelBin,        spirv::kMetavoxelBinVolume,   spirv::kMetavoxelPlan,
-                               spirv::kMetavoxelRank,       spirv::kMetavoxelBlocks,      spirv::kMetavoxelFill,
-                               spirv::kMetavoxelFillVolume, spirv::kMetavoxelSum,         spirv::kMetavoxelLight,
-                               spirv::kMetavoxelShadow,     spirv::kMetavoxelMarchHalf,   spirv::kMetavoxelMarchSingle,
-                               spirv::kMetavoxelFinishHalf, spirv::kMetavoxelFinishSingle};
+  static const Code codes[] = {
+      spirv::kMetavoxelClear,       spirv::kMetavoxelReset,      spirv::kMetavoxelSpawn,
+      spirv::kMetavoxelBin,         spirv::kMetavoxelBin,        spirv::kMetavoxelBinVolume,
+      spirv::kMetavoxelPlan,        spirv::kMetavoxelRank,       spirv::kMetavoxelBlocks,
+      spirv::kMetavoxelFill,        spirv::kMetavoxelFillVolume, spirv::kMetavoxelSum,
+      spirv::kMetavoxelLight,       spirv::kMetavoxelShadow,     spirv::kMetavoxelMarchHalf,
+      spirv::kMetavoxelMarchSingle, spirv::kMetavoxelFinishHalf, spirv::kMetavoxelFinishSingle};
   return codes[static_cast<std::size_t>(pass)];
 }
 

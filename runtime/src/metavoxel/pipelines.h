@@ -14,6 +14,7 @@ namespace billow::runtime {
 enum class MetavoxelPass : std::uint32_t {
   clear,
   reset,
+  spawn,
   binCount,
   binWrite,
   binVolume,

@@ -18,9 +18,9 @@ Result<void> keep(Result<T> made, T& place) {
   return {};
 }
 
-// The sections of the tables' staging memory, and where the first three go.
+// The sections of the tables' staging memory, and where all but the last go.
 struct TableParts {
-  std::uint64_t materials, curves, ramps, cubes, bytes;
+  std::uint64_t materials, curves, ramps, emitters, points, cubes, bytes;
 };
 
 TableParts tableParts(const MetavoxelSizes& sizes) {
@@ -28,6 +28,8 @@ TableParts tableParts(const MetavoxelSizes& sizes) {
   TableParts parts{};
   parts.curves = regions.curves - regions.materials;
   parts.ramps = regions.ramps - regions.materials;
+  parts.emitters = regions.emitters - regions.materials;
+  parts.points = regions.points - regions.materials;
   parts.cubes = regions.columns - regions.materials;
   parts.bytes = parts.cubes + std::uint64_t{sizes.cubeLayers} * kFace * kFace;
   return parts;
@@ -199,7 +201,14 @@ void MetavoxelResources::fillTables(const MetavoxelConfig& config) {
   copy(config.tables->materials, parts.materials);
   copy(config.tables->curves, parts.curves);
   copy(config.tables->ramps, parts.ramps);
-  std::uint64_t at = parts.cubes;
+  copy(config.tables->emitters, parts.emitters);
+  static_assert(sizeof(format::TrackPoint) == 16);
+  std::uint64_t at = parts.points;
+  for (const auto& frame : config.tables->trackPoints) {
+    copy(frame, at);
+    at += frame.size() * sizeof(format::TrackPoint);
+  }
+  at = parts.cubes;
   for (const format::CubeMap& map : config.tables->maps) {
     const format::DecodedCube cube(map);
     for (std::uint32_t face = 0; face < format::kCubeFaces; ++face, at += kFace * kFace) {

@@ -12,7 +12,7 @@ struct MetavoxelUpload {
   std::uint64_t view;       // offset of MarchParams
   std::uint64_t volumes;    // of one MarchParams a volume, kMarchStride apart
   std::uint64_t space;      // of MetavoxelParams
-  std::uint64_t particles;  // of Particles
+  std::uint64_t particles;  // of the host's Particles, and behind them the effects' jobs
 };
 
 // At least as large as any device's uniform buffer alignment.
@@ -52,7 +52,7 @@ class MetavoxelResources {
   MetavoxelSizes sizes_{};
   std::uint64_t uploadStride_ = 0;
   std::uint32_t volumes_ = 0;
-  Buffer tables_;  // materials, curves, ramps and the cube maps' texels, until they are copied
+  Buffer tables_;  // materials, curves, ramps, emitters, tracks and the cube maps' texels, until they are copied
 };
 
 }  // namespace billow::runtime

@@ -12,6 +12,12 @@ std::uint64_t bytesOf(const Rows& rows) {
   return rows.size() * sizeof(rows[0]);
 }
 
+std::uint64_t pointBytes(const format::EffectTables& tables) {
+  std::uint64_t bytes = 0;
+  for (const auto& frame : tables.trackPoints) bytes += bytesOf(frame);
+  return bytes;
+}
+
 // Slots as an image's box: rows of eight, layers of eight rows, or fewer, powers of two. Never more than asked for.
 void shapeSlots(std::uint64_t slots, std::uint32_t maxImageExtent3D, MetavoxelSizes& sizes) {
   const std::uint64_t along = std::max<std::uint64_t>(maxImageExtent3D / sizes.edge, 1);
@@ -44,9 +50,13 @@ MetavoxelRegions regionsOf(const MetavoxelConfig& config, const MetavoxelSizes& 
   regions.cursors = region(most * 4);
   regions.entries = region(std::uint64_t{config.maxListEntries} * 4);
   regions.particles = region(std::uint64_t{config.maxParticles} * sizeof(format::Particle));
+  // None of a draw's jobs is empty.
+  regions.jobs = region(tables.effects.empty() ? 0 : std::uint64_t{config.maxParticles} * sizeof(gpu::SpawnJob));
   regions.materials = region(bytesOf(tables.materials));
   regions.curves = region(bytesOf(tables.curves));
   regions.ramps = region(bytesOf(tables.ramps));
+  regions.emitters = region(bytesOf(tables.emitters));
+  regions.points = region(pointBytes(tables));
   regions.columns = region(most * sizes.inner * sizes.inner * 4);
   regions.blocks = region(sizes.blocks() * 4);
   regions.volumeWork = region(sizes.blocks() * 8);

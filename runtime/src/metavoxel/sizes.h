@@ -15,8 +15,8 @@ inline constexpr std::uint64_t kTexelBytes = 12;  // 8 of the pool's image, 4 of
 
 // Where the arrays of metavoxel_interface.h begin in the device's buffer.
 struct MetavoxelRegions {
-  std::uint64_t counters, rounds, words, positions, found, cellAt, lists, cursors, entries, particles, materials,
-      curves, ramps, columns, blocks, volumeWork, fillWork, emission;
+  std::uint64_t counters, rounds, words, positions, found, cellAt, lists, cursors, entries, particles, jobs, materials,
+      curves, ramps, emitters, points, columns, blocks, volumeWork, fillWork, emission;
   std::uint64_t bytes;
 };
 

@@ -58,6 +58,10 @@ class Headless {
   // The texels of Metavoxels::shadow() after a draw, row by row.
   virtual Result<std::vector<float>> readShadow(runtime::Renderer& renderer, const runtime::Metavoxels& metavoxels) = 0;
 
+  // Metavoxels::particles() after a draw; their centres are in the world.
+  virtual Result<std::vector<format::Particle>> readParticles(runtime::Renderer& renderer,
+                                                              const runtime::Metavoxels& metavoxels) = 0;
+
   // Milliseconds between MetavoxelDraw::timestamps, one row a draw.
   virtual Result<std::vector<PassTimes>> time(runtime::Renderer& renderer, runtime::Metavoxels& metavoxels,
                                               runtime::MetavoxelDraw draw, std::uint32_t count) = 0;

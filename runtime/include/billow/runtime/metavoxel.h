@@ -24,13 +24,15 @@ struct MetavoxelConfig {
   // Bytes of all memory that this object allocates, within the Renderer's budget too. What is left after the lists is
   // the pool: 12 bytes a texel. Too little for a 256th of maxMetavoxels is an error.
   std::uint64_t memoryBudget = std::uint64_t{512} << 20;
-  std::uint32_t maxMetavoxels = 4096;       // occupied ones of a draw, 1 to 65535; further ones are left out
-  std::uint32_t maxParticles = 16384;       // of a draw, 0 to 1 048 576
+  std::uint32_t maxMetavoxels = 4096;  // occupied ones of a draw, 1 to 65535; further ones are left out
+  // Of a draw, 0 to 1 048 576: those of the host and all that its effects may have alive, which are up to three a span
+  // more than are.
+  std::uint32_t maxParticles = 16384;
   std::uint32_t maxListEntries = 1u << 20;  // particles in metavoxels' lists, all together; further ones are left out
   std::uint32_t maxVolumes = 4;             // of a draw, 0 to 8
   std::uint32_t recordsInFlight = 3;        // record() calls whose commands may be pending at once, at least 1
-  // Materials, curves, ramps and maps of the particles; kept to the format's rules (those of an open pack are). Read by
-  // create() alone. Without them there are no particles.
+  // Effects, and materials, curves, ramps, maps and tracks of the particles; kept to the format's rules (those of an
+  // open pack are). Read by create() alone. Without them there are no particles.
   const format::EffectTables* tables = nullptr;
 };
 
@@ -40,6 +42,15 @@ struct MetavoxelVolume {
   // scene's world.
   std::array<double, 12> objectToWorld{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
   Look look = {};  // its anisotropy, ambient and scatteringOrders are not used: see Scattering
+};
+
+// An effect of the tables, evaluated on the GPU: what format::particlesAt() gives, in single precision.
+struct MetavoxelEffect {
+  std::uint32_t effect = 0;  // number in the tables
+  double time = 0;           // seconds since its begin, finite; outside of [0, format::kMaxEffectTime] it is not there
+  // Row-major 3x4, from the effect's own world to the scene's: a format::similarityOf(). Its particles look like
+  // format::transformed(): larger, they are thinner by as much.
+  std::array<double, 12> objectToWorld{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 };
 
 // How all matter of the space scatters: what shares a voxel shares this.
@@ -71,6 +82,7 @@ struct MetavoxelDraw {
   float voxelSize = 0.1f;
   std::span<const MetavoxelVolume> volumes = {};
   std::span<const format::Particle> particles = {};  // those of radius 0 are not there
+  std::span<const MetavoxelEffect> effects = {};     // their particles come behind those of the host
   float step = 1;       // of the march, in voxels along the direction of view, >= kLeastStep
   bool jitter = false;  // displace each pixel's steps by a fixed pattern: noise in place of bands
   bool cull = true;     // leave out what neither the eye sees nor light passes on its way to what it may see
@@ -81,7 +93,7 @@ struct MetavoxelDraw {
   VkImageView depth = VK_NULL_HANDLE;
   VkImageView sceneDepth = VK_NULL_HANDLE;  // optional storage image R32F: distance of the scene along `forward`
   // Optional: kMetavoxelTimestamps queries of a timestamp pool, reset by the host, from firstTimestamp on: begin,
-  // binned, first round filled, lit and marched, end.
+  // effects evaluated and binned, first round filled, lit and marched, end.
   VkQueryPool timestamps = VK_NULL_HANDLE;
   std::uint32_t firstTimestamp = 0;
 };
@@ -105,6 +117,14 @@ struct MetavoxelShadow {
   std::array<std::array<double, 4>, 2> toTexel{};
 };
 
+// The particles of the draw recorded last, as its passes read them.
+struct MetavoxelParticles {
+  VkBuffer buffer = VK_NULL_HANDLE;  // usable as a storage buffer and to copy from; written anew by each draw
+  VkDeviceSize offset = 0;           // of format::Particle's, those of the host first; of radius 0: not there
+  std::uint32_t count = 0;
+  std::array<double, 3> center{0, 0, 0};  // to which their centres are relative
+};
+
 // One space. Used from one thread at a time, destroyed before its Renderer and when no commands that use it are
 // pending.
 class Metavoxels {
@@ -120,6 +140,7 @@ class Metavoxels {
 
   virtual MetavoxelStats stats() const = 0;
   virtual MetavoxelShadow shadow() const = 0;
+  virtual MetavoxelParticles particles() const = 0;
   virtual std::uint32_t poolSlots() const = 0;       // metavoxels that are resident at once
   virtual std::uint64_t bytesAllocated() const = 0;  // never above memoryBudget
 };
