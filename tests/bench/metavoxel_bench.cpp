@@ -1,9 +1,11 @@
-// What metavoxels cost on a real GPU: billow_metavoxel_bench PACK [--frames N] [--frame I] [--size WxH] [--device D]
-// [--picture FILE.ppm] draws the pack's frame in a cloud of displaced spheres and prints, for each scene, the median
-// time of every pass, of all, and the memory. It needs nothing but libvulkan and a driver at run time.
+// What metavoxels cost on a real GPU: billow_metavoxel_bench [PACK] [--frames N] [--frame I] [--size WxH] [--device D]
+// [--picture FILE.ppm] evaluates an effect's particles on CPU and GPU; with a pack it then draws the pack's frame in a
+// cloud of displaced spheres and prints, for each scene, the median time of every pass, of all, and the memory. It
+// needs nothing but libvulkan and a driver at run time.
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -12,6 +14,7 @@
 #include <vector>
 
 #include "bench_failure.h"
+#include "billow/format/effect.h"
 #include "billow/format/noise.h"
 #include "billow/headless/headless.h"
 #include "billow/runtime/look.h"
@@ -75,9 +78,6 @@ Options parse(int argc, char** argv) {
       if (++i >= argc || std::sscanf(argv[i], "%ux%u", &options.width, &options.height) != 2) fail("--size WxH");
     } else
       options.pack = argument;
-  }
-  if (options.pack.empty()) {
-    fail("usage: billow_metavoxel_bench PACK [--frames N] [--frame I] [--size WxH] [--device D] [--picture FILE.ppm]");
   }
   return options;
 }
@@ -144,6 +144,48 @@ std::vector<format::Particle> dust(const Scene& scene, const std::array<double, 
     particle.seed = i;
   }
   return particles;
+}
+
+// An effect of about 15 000 particles that are alive at any time, with all that the closed form and looks can have.
+format::EffectTables effectTables() {
+  format::EffectTables tables = dustTables();
+  for (std::uint32_t row = 0; row < 8; ++row) {
+    format::CurveRow& curve = tables.curves.emplace_back();
+    for (std::uint32_t i = 0; i < format::kCurveSamples; ++i) {
+      curve.values[i] = 0.5f + 0.4f * std::sin(static_cast<float>(i * (row + 1)) * 0.05f);
+    }
+  }
+  format::EffectRecord effect{};
+  effect.emitterCount = 1;
+  effect.flags = format::kEffectLoop | format::kEffectPrewarm;
+  effect.duration = 4;
+  tables.effects.push_back(effect);
+  format::EmitterRecord emitter{};
+  emitter.spanCount = 1;
+  emitter.shape = format::kShapeSphere;
+  emitter.extent[0] = 1;
+  emitter.positionRow = 0;
+  emitter.lifetime[0] = 2;
+  emitter.lifetime[1] = 4;
+  emitter.direction[1] = 1;
+  emitter.spreadCosine = 0.5f;
+  emitter.speed[1] = 3;
+  emitter.gravity[1] = -1;
+  emitter.drag = 0.4f;
+  emitter.radius[0] = emitter.radius[1] = 0.1f;
+  emitter.radiusRow = 3;
+  emitter.extinction = 1;
+  emitter.opacityRow = 4;
+  std::fill_n(emitter.diffuse, 3, 0.5f);
+  emitter.diffuseRow = 5;
+  emitter.emissionRow = emitter.displacementRow = format::kNoRow;
+  emitter.rotationRow = 6;
+  emitter.mapCount = 4;
+  emitter.mapsPerSecond = 2;
+  emitter.track = format::kNoTrack;
+  tables.emitters.push_back(emitter);
+  tables.spans.push_back({0, 4, 0, 20000});
+  return tables;
 }
 
 template <class Rows>
@@ -219,13 +261,58 @@ void measure(headless::Headless& gpu, const format::Pack& pack, const Options& o
   gpu.waitIdle();
 }
 
+double secondsOf(const auto& work) {
+  const auto begin = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+// An effect outside of the space, so that the first stage of a draw is the copying and evaluating of particles alone.
+void measureEffect(headless::Headless& gpu, const Options& options) {
+  const format::EffectTables tables = effectTables();
+  constexpr double kTime = 10;
+  const auto renderer = valueOf(runtime::Renderer::create(gpu.host(), {}));
+  const auto metavoxels = valueOf(runtime::Metavoxels::create(
+      *renderer, {.metavoxels = 8, .maxMetavoxels = 512, .maxParticles = 32768, .tables = &tables}));
+  std::vector<format::Particle> particles = format::particlesAt(tables, 0, kTime);
+  const double cpu = secondsOf([&] { particles = format::particlesAt(tables, 0, kTime); });
+  std::size_t candidates = 0;
+  const double plan = secondsOf([&] {
+    for (const auto& some : format::candidatesAt(tables, 0, kTime)) candidates += some.last - some.first;
+  });
+  const runtime::MetavoxelEffect effect{.time = kTime, .objectToWorld = {1, 0, 0, 1e4, 0, 1, 0, 0, 0, 0, 1, 0}};
+  for (format::Particle& particle : particles) particle.center[0] += 1e4f;
+  runtime::MetavoxelDraw draw;
+  draw.view = runtime::lookAt({0, 0, 50}, {0, 0, 0}, {0, 1, 0}, 35);
+  draw.width = draw.height = 64;
+  const auto firstStage = [&] {
+    valueOf(gpu.time(*renderer, *metavoxels, draw, std::min(options.draws, 5u)));
+    return median(valueOf(gpu.time(*renderer, *metavoxels, draw, options.draws)), 0, 1);
+  };
+  const double nothing = firstStage();
+  draw.particles = particles;
+  const double copied = firstStage();
+  draw.particles = {};
+  draw.effects = {&effect, 1};
+  const double evaluated = firstStage();
+  fmt::print("effect: {} particles alive of {} candidates\n", particles.size(), candidates);
+  fmt::print("  CPU {:.3f} ms, {:.1f} million a second; candidates alone {:.3f} ms\n", cpu * 1e3,
+             static_cast<double>(particles.size()) / cpu * 1e-6, plan * 1e3);
+  fmt::print("  first stage: {:.3f} ms without particles, {:.3f} copied, {:.3f} evaluated: {:.1f} million a second\n",
+             nothing, copied, evaluated, static_cast<double>(particles.size()) / (evaluated - nothing) * 1e-3);
+  gpu.waitIdle();
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   const Options options = parse(argc, argv);
+  const auto gpu = valueOf(headless::Headless::create(options.device));
+  fmt::print("{}, median of {} draws\n", gpu->deviceName(), options.draws);
+  measureEffect(*gpu, options);
+  if (options.pack.empty()) return 0;
   const format::Pack pack = valueOf(format::Pack::openFile(options.pack));
   if (pack.volumes().empty()) fail("the pack has no volume");
-  const auto gpu = valueOf(headless::Headless::create(options.device));
   const format::EffectTables tables = dustTables();
   fmt::print("{} on {}, {}x{}, median of {} draws, milliseconds\n", options.pack, gpu->deviceName(), options.width,
              options.height, options.draws);
