@@ -63,10 +63,10 @@ float series(float x, uint shift) {
 float decayMean(float x) { return x < 0.5 ? series(x, 1u) : (1.0 - exp(-x)) / x; }
 float decayMeanSlope(float x) { return x < 0.5 ? series(x, 2u) * 0.5 : (1.0 - decayMean(x)) / x; }
 
-// Uniform over the part of the unit sphere within the cone around the z axis.
+// Uniform over the part of the unit sphere within the cone around the z axis. 1 - z^2 would cancel near the axis.
 vec3 coneDirection(float cosine, float a, float b) {
-  const float z = 1.0 - a * (1.0 - cosine);
-  return vec3(sqrt(max(1.0 - z * z, 0.0)) * sineCosine(b).yx, z);
+  const float below = a * (1.0 - cosine);
+  return vec3(sqrt(max(below * (2.0 - below), 0.0)) * sineCosine(b).yx, 1.0 - below);
 }
 
 // The vector in a frame whose z axis is `axis` (Duff et al. 2017).

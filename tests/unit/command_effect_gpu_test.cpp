@@ -43,7 +43,7 @@ TEST_P(SampleEffects, HaveTheSameParticlesOnTheGpu) {
 INSTANTIATE_TEST_SUITE_P(All, SampleEffects,
                          testing::Values("campfire_smoke", "cloud_bank", "dust_wave", "explosion", "magic_trail",
                                          "steam_jet"),
-                         [](const auto& info) { return std::string(info.param); });
+                         [](const auto& sample) { return std::string(sample.param); });
 
 }  // namespace
 }  // namespace billow::tests
