@@ -25,7 +25,8 @@ void write(uvec3 cell, uint particle) {
 }
 
 void main() {
-  const uint number = gl_WorkGroupID.x;
+  const uint number = gl_WorkGroupID.y * kBinRow + gl_WorkGroupID.x;
+  if (number >= meta.limits.x) return;
   const Particle particle = Particles(meta.entries.zw).items[number];
   if (!(particle.radius > 0.0)) return;
   const vec3 center = voxelOf(particle.center);

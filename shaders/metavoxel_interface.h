@@ -26,6 +26,7 @@ BILLOW_GPU_CONST kUseErosion = 1u;  // of materials, all together: what none use
 BILLOW_GPU_CONST kUseRamps = 2u;
 BILLOW_GPU_CONST kUseCurves = 4u;
 BILLOW_GPU_CONST kMaxVolumes = 8u;
+BILLOW_GPU_CONST kBinRow = 32768u;  // particles that are binned side by side: devices may not dispatch 65536
 BILLOW_GPU_CONST kCubeLayers = 6u;       // of a cube map: faces, each with a border of one texel
 BILLOW_GPU_CONST kCubeFaceTexels = 66u;  // an edge, border included
 

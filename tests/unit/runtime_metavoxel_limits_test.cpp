@@ -107,6 +107,23 @@ TEST_F(MetavoxelLimits, NothingGivesTheBackground) {
   }
 }
 
+// More than one row of workgroups: a device need not dispatch more than 65535.
+TEST_F(MetavoxelLimits, ManyParticlesAreAllBinned) {
+  MetavoxelConfig config = smallConfig();
+  config.maxParticles = 70000;
+  const auto metavoxels = make(config);
+  MetavoxelDraw draw = smallDraw();
+  std::vector<Particle> particles(70000, ball({0, 0, 0}, 0, 1));
+  particles.front() = ball({-2, 0, 0}, 1, 1);
+  particles.back() = ball({2, 0, 0}, 1, 1);
+  draw.particles = particles;
+  const headless::Picture many = render(*metavoxels, draw);
+  const std::vector<Particle> two{particles.front(), particles.back()};
+  draw.particles = two;
+  EXPECT_EQ(largestDifference(render(*metavoxels, draw), many), 0);
+  EXPECT_GT(metavoxels->stats().listEntries, 10u);
+}
+
 // A draw with more of everything than fits says so, and the next one is as if it had not been.
 TEST_F(MetavoxelLimits, TooMuchIsLeftOutOnceOnly) {
   MetavoxelConfig config = smallConfig();

@@ -1,5 +1,6 @@
 #include "billow/runtime/metavoxel.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <utility>
@@ -255,8 +256,10 @@ class MetavoxelsImpl final : public Metavoxels {
 
   void recordBin(VkCommandBuffer commands, const Steps& steps) {
     const std::uint32_t particles = steps.particles;
+    const std::array<std::uint32_t, 3> groups{std::min(particles, gpu::kBinRow),
+                                              (particles + gpu::kBinRow - 1) / gpu::kBinRow, 1};
     const std::uint64_t rank = resources_.sizes().regions.counters + offsetof(gpu::MetavoxelCounters, rank);
-    if (particles != 0) dispatch(commands, steps.binCount, {}, {particles, 1, 1});
+    if (particles != 0) dispatch(commands, steps.binCount, {}, groups);
     for (std::uint32_t i = 0; i < steps.volumes.size(); ++i) {
       const VolumeSteps& volume = steps.volumes[i];
       if (!volume.drawn()) continue;
@@ -271,7 +274,7 @@ class MetavoxelsImpl final : public Metavoxels {
     barrier(commands);
     indirect(commands, steps.rank, {}, rank);
     barrier(commands);
-    if (particles != 0) dispatch(commands, steps.binWrite, {}, {particles, 1, 1});
+    if (particles != 0) dispatch(commands, steps.binWrite, {}, groups);
     barrier(commands);
   }
 

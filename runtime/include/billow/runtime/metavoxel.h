@@ -2,7 +2,7 @@
 // other.
 //
 //   auto metavoxels = billow::runtime::Metavoxels::create(*renderer, {.tables = &pack.effects()});
-//   (*metavoxels)->record(commandBuffer, {.view = view, .volumes = volumes, .particles = particles, ...});
+//   (*metavoxels)->record(commandBuffer, {.view = view, .volumes = volumes, .effects = effects, ...});
 //
 // The space is a cube of metavoxels whose z axis runs along the sunlight. A metavoxel is a cube of voxels with a border
 // of one, so that filtering has no seam; only those in which something is exist. Each draw bins what it is given, fills
