@@ -217,6 +217,18 @@ TEST_F(MetavoxelEffects, KeepTheLimitOfParticles) {
   gpu().waitIdle();
 }
 
+TEST_F(MetavoxelEffects, CountTheirTracksInTheBudget) {
+  std::uint64_t bytes = 0;
+  for (const auto& frame : tables_.trackPoints) bytes += frame.size() * sizeof(format::TrackPoint);
+  const std::uint64_t with = make(config_)->bytesAllocated();
+  tables_.emitters[2].track = format::kNoTrack;
+  tables_.tracks.clear();
+  tables_.trackFrames.clear();
+  tables_.trackPoints.clear();
+  EXPECT_GE(with, make(config_)->bytesAllocated() + bytes);
+  EXPECT_GT(bytes, 60000u);
+}
+
 TEST_F(MetavoxelEffects, NameWhatIsWrong) {
   const auto metavoxels = make(config_);
   const auto broken = [&](const MetavoxelEffect& effect) {

@@ -123,6 +123,7 @@ class MetavoxelsImpl final : public Metavoxels {
                                                             {half ? marchHalf : marchSingle, &steps.march},
                                                             {half ? finishHalf : finishSingle, &steps.finish}};
     for (const auto& [pass, place] : wanted) {
+      if (pass == spawn && !planner_.hasEffects()) continue;
       const auto made = pipelines_.pipeline(pass);
       if (!made) return tl::unexpected(made.error());
       *place = *made;
@@ -154,8 +155,8 @@ class MetavoxelsImpl final : public Metavoxels {
   Result<void> write(const MetavoxelDraw& draw, const Steps& steps) {
     const MetavoxelUpload upload = resources_.uploadOf(next_);
     if (auto written = writeParticles(draw, steps.space, upload.particles); !written) return written;
-    for (std::size_t i = 0; i < steps.spawns.jobs.size(); ++i)
-      put(jobsAt(draw) + i * sizeof(gpu::SpawnJob), steps.spawns.jobs[i]);
+    const std::vector<gpu::SpawnJob>& jobs = steps.spawns.jobs;
+    for (std::size_t i = 0; i < jobs.size(); ++i) put(jobsAt(draw) + i * sizeof(gpu::SpawnJob), jobs[i]);
     put(upload.view, viewOf(draw));
     for (std::size_t i = 0; i < steps.volumes.size(); ++i) {
       if (steps.volumes[i].drawn()) put(upload.volumes + i * kMarchStride, steps.volumes[i].placed->params);

@@ -19,6 +19,8 @@ class SpawnPlanner {
   // Keeps what it needs of the tables; null: there are no effects.
   explicit SpawnPlanner(const format::EffectTables* tables);
 
+  bool hasEffects() const { return !tables_.effects.empty(); }
+
   // The draw's effects, their particles behind those of the host. Fails with argument where one is none, lies beyond
   // its range, or all particles together are more than `most`.
   Result<SpawnPlan> plan(const MetavoxelDraw& draw, const Vec3d& center, std::uint32_t most) const;
