@@ -25,8 +25,8 @@ struct MetavoxelConfig {
   // the pool: 12 bytes a texel. Too little for a 256th of maxMetavoxels is an error.
   std::uint64_t memoryBudget = std::uint64_t{512} << 20;
   std::uint32_t maxMetavoxels = 4096;  // occupied ones of a draw, 1 to 65535; further ones are left out
-  // Of a draw, 0 to 1 048 576: those of the host and all that its effects may have alive, which are up to three a span
-  // more than are.
+  // Of a draw, 0 to 1 048 576: those of the host and all that its effects may have alive (format::candidatesAt(): as
+  // many as if all lived for the emitter's greatest lifetime, and up to two more a span). More are an error.
   std::uint32_t maxParticles = 16384;
   std::uint32_t maxListEntries = 1u << 20;  // particles in metavoxels' lists, all together; further ones are left out
   std::uint32_t maxVolumes = 4;             // of a draw, 0 to 8
