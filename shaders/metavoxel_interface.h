@@ -33,6 +33,7 @@ BILLOW_GPU_CONST kCubeFaceTexels = 66u;  // an edge, border included
 BILLOW_GPU_CONST kFlagCull = 1u;        // cells that neither the eye sees nor light passes on its way to what it sees
 BILLOW_GPU_CONST kFlagReciprocal = 2u;  // 1 / (1 + d) in place of exp(-d)
 BILLOW_GPU_CONST kFlagSceneDepth = 4u;  // rays end at the scene
+BILLOW_GPU_CONST kFlagShadowMap = 8u;   // light ends at the scene
 
 // One thing to draw: the metavoxels at positions first to first + count - 1.
 struct MetavoxelRound {
@@ -89,8 +90,11 @@ struct MetavoxelParams {
   uvec4 work;     // addresses: work items of volumes; of particles (metavoxel_work.glsl)
   uvec4 emitters;  // addresses: emitters; points of tracks
   uvec4 spawn;     // address of jobs; their number; candidates, the last of the particles
+  vec4 mapStep;    // the scene's shadow map: its texel is x * xy + y * zw, and
+  vec4 mapAt;      // + xy; z: its value where no surface is; w: samples of it along a voxel's edge
+  vec4 mapZ;       // voxel z = dot(xyz, (value, voxel x, voxel y)) + w
 };
-BILLOW_GPU_SIZE(MetavoxelParams, 29 * 16);
+BILLOW_GPU_SIZE(MetavoxelParams, 32 * 16);
 
 #ifdef __cplusplus
 }  // namespace billow::runtime::gpu

@@ -3,7 +3,9 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
+#extension GL_EXT_samplerless_texture_functions : require
 
+#include "metavoxel_caster.glsl"
 #include "metavoxel_column.glsl"
 #include "phase.glsl"
 
@@ -26,8 +28,9 @@ void lightTexel(Column column, uint z, uint holds, inout float depth) {
   if (z == 0u) depth -= through;
   vec3 radiance = matter.emission;
   if (matter.extinction > 0.0) {
-    const vec3 light = sunAt(max(depth + 0.5 * through, 0.0), texelVoxel(column.cell, texel)) + params.ambient.rgb;
-    radiance += matter.albedo * matter.extinction * light;
+    const vec3 voxel = texelVoxel(column.cell, texel);
+    const vec3 sun = sunnyShare(voxel.z) * sunAt(max(depth + 0.5 * through, 0.0), voxel);
+    radiance += matter.albedo * matter.extinction * (sun + params.ambient.rgb);
   }
   depth += through;
   imageStore(pool, ivec3(slotCorner(column.slot) + texel),
@@ -37,6 +40,7 @@ void lightTexel(Column column, uint z, uint holds, inout float depth) {
 void main() {
   const Column column = columnOf();
   if (any(greaterThanEqual(column.texel, uvec2(edgeTexels())))) return;
+  findCasters(texelVoxel(column.cell, uvec3(column.texel, 0u)).xy);
   float depth = depthAbove(column.cell, column.texel);
   for (uint block = 0u; block < blocksAxis(); ++block) {
     const uint holds = blockHolds(column.slot, uvec3(column.block, block));

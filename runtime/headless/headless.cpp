@@ -20,6 +20,14 @@ float halfToFloat(std::uint16_t half) {
   return sign * std::ldexp(static_cast<float>(mantissa + 1024), exponent - 25);
 }
 
+class SceneImageImpl final : public SceneImage {
+ public:
+  explicit SceneImageImpl(const VulkanDevice& device) : target(device) {}
+  VkImageView view() const override { return target.view; }
+
+  Target target;
+};
+
 class HeadlessImpl final : public Headless {
  public:
   ~HeadlessImpl() override {
@@ -61,22 +69,31 @@ class HeadlessImpl final : public Headless {
 
   Result<Picture> render(runtime::Renderer& renderer, runtime::Metavoxels& metavoxels, runtime::MetavoxelDraw draw,
                          std::span<const float> sceneDepth) override {
-    Target scene(device_), staging(device_);
+    std::unique_ptr<SceneImage> scene;
     if (!sceneDepth.empty()) {
-      const VkDeviceSize bytes = sceneDepth.size_bytes();
-      if (auto done = staging.makeBuffer(bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT); !done) {
-        return tl::unexpected(done.error());
-      }
-      if (auto done = scene.makeImage(VK_FORMAT_R32_SFLOAT, draw.width, draw.height); !done) {
-        return tl::unexpected(done.error());
-      }
-      std::memcpy(staging.mapped, sceneDepth.data(), bytes);
-      draw.sceneDepth = scene.view;
+      auto made = sceneImage(draw.width, draw.height, sceneDepth);
+      if (!made) return tl::unexpected(made.error());
+      scene = std::move(*made);
+      draw.sceneDepth = scene->view();
     }
-    return drawPicture(renderer, draw, uploadOf(draw), [&] {
-      if (!sceneDepth.empty()) fillImage(scene.image, draw.width, draw.height, staging.buffer);
-      return metavoxels.record(commands_, draw);
-    });
+    return drawPicture(renderer, draw, uploadOf(draw), [&] { return metavoxels.record(commands_, draw); });
+  }
+
+  Result<std::unique_ptr<SceneImage>> sceneImage(std::uint32_t width, std::uint32_t height,
+                                                 std::span<const float> texels) override {
+    auto made = std::make_unique<SceneImageImpl>(device_);
+    Target staging(device_);
+    if (auto done = staging.makeBuffer(texels.size_bytes(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT); !done) {
+      return tl::unexpected(done.error());
+    }
+    if (auto done = made->target.makeImage(VK_FORMAT_R32_SFLOAT, width, height); !done) {
+      return tl::unexpected(done.error());
+    }
+    std::memcpy(staging.mapped, texels.data(), texels.size_bytes());
+    beginCommands();
+    fillImage(made->target.image, width, height, staging.buffer);
+    if (auto done = submitAndWait(VK_NULL_HANDLE, 0); !done) return tl::unexpected(done.error());
+    return std::unique_ptr<SceneImage>(std::move(made));
   }
 
   Result<std::vector<float>> readShadow(runtime::Renderer& renderer, const runtime::Metavoxels& metavoxels) override {
@@ -90,7 +107,7 @@ class HeadlessImpl final : public Headless {
     copyImage(shadow.image, shadow.size, shadow.size, out.buffer, 0);
     barrier(VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_2_HOST_BIT,
             VK_ACCESS_2_HOST_READ_BIT);
-    if (auto done = submitAndWait(renderer, 0); !done) return tl::unexpected(done.error());
+    if (auto done = submitAndWait(renderer.uploadSemaphore(), 0); !done) return tl::unexpected(done.error());
     return std::vector<float>(out.mapped, out.mapped + texels);
   }
 
@@ -107,7 +124,7 @@ class HeadlessImpl final : public Headless {
     device_.vk.vkCmdCopyBuffer(commands_, particles.buffer, out.buffer, 1, &copy);
     barrier(VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_2_HOST_BIT,
             VK_ACCESS_2_HOST_READ_BIT);
-    if (auto done = submitAndWait(renderer, 0); !done) return tl::unexpected(done.error());
+    if (auto done = submitAndWait(renderer.uploadSemaphore(), 0); !done) return tl::unexpected(done.error());
     std::memcpy(all.data(), out.mapped, bytes);
     for (format::Particle& particle : all) {
       for (std::size_t i = 0; i < 3; ++i) {
@@ -162,7 +179,8 @@ class HeadlessImpl final : public Headless {
     if (auto done = renderer.recordLookup(commands_, info); !done) return tl::unexpected(done.error());
     barrier(VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT, VK_ACCESS_2_SHADER_WRITE_BIT, VK_PIPELINE_STAGE_2_HOST_BIT,
             VK_ACCESS_2_HOST_READ_BIT);
-    if (auto done = submitAndWait(renderer, frame.uploadValue()); !done) return tl::unexpected(done.error());
+    if (auto done = submitAndWait(renderer.uploadSemaphore(), frame.uploadValue()); !done)
+      return tl::unexpected(done.error());
     return std::vector<float>(out.mapped, out.mapped + count);
   }
 
@@ -194,7 +212,7 @@ class HeadlessImpl final : public Headless {
     copyImage(depth.image, draw.width, draw.height, readBack.buffer, pixels * 16);
     barrier(VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_2_HOST_BIT,
             VK_ACCESS_2_HOST_READ_BIT);
-    if (auto done = submitAndWait(renderer, uploadValue); !done) return tl::unexpected(done.error());
+    if (auto done = submitAndWait(renderer.uploadSemaphore(), uploadValue); !done) return tl::unexpected(done.error());
     Picture picture{.width = draw.width, .height = draw.height, .rgba = {}, .depth = {}};
     if (draw.colorFormat == runtime::ColorFormat::half) {
       std::vector<std::uint16_t> halves(pixels * 4);
@@ -218,7 +236,7 @@ class HeadlessImpl final : public Headless {
       toGeneral(color.image, depth.image);
       device_.vk.vkCmdResetQueryPool(commands_, queries_, 0, runtime::kMetavoxelTimestamps);
       if (auto done = record(); !done) return done;
-      if (auto done = submitAndWait(renderer, uploadValue); !done) return done;
+      if (auto done = submitAndWait(renderer.uploadSemaphore(), uploadValue); !done) return done;
       take();
     }
     return {};
@@ -311,16 +329,17 @@ class HeadlessImpl final : public Headless {
     device_.vk.vkCmdCopyImageToBuffer(commands_, image, VK_IMAGE_LAYOUT_GENERAL, to, 1, &copy);
   }
 
-  Result<void> submitAndWait(const runtime::Renderer& renderer, std::uint64_t uploadValue) {
+  // After the semaphore has reached the value, where there is one.
+  Result<void> submitAndWait(VkSemaphore semaphore, std::uint64_t value) {
     device_.vk.vkEndCommandBuffer(commands_);
     auto commandInfo = begin<VkCommandBufferSubmitInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO);
     commandInfo.commandBuffer = commands_;
     auto wait = begin<VkSemaphoreSubmitInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO);
-    wait.semaphore = renderer.uploadSemaphore();
-    wait.value = uploadValue;
+    wait.semaphore = semaphore;
+    wait.value = value;
     wait.stageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT;
     auto info = begin<VkSubmitInfo2>(VK_STRUCTURE_TYPE_SUBMIT_INFO_2);
-    info.waitSemaphoreInfoCount = 1;
+    info.waitSemaphoreInfoCount = semaphore != VK_NULL_HANDLE ? 1 : 0;
     info.pWaitSemaphoreInfos = &wait;
     info.commandBufferInfoCount = 1;
     info.pCommandBufferInfos = &commandInfo;

@@ -37,7 +37,8 @@ Result<void> Target::makeImage(VkFormat format, std::uint32_t width, std::uint32
   info.extent = {width, height, 1};
   info.mipLevels = info.arrayLayers = 1;
   info.samples = VK_SAMPLE_COUNT_1_BIT;
-  info.usage = VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT;
+  info.usage = VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT |
+               VK_IMAGE_USAGE_TRANSFER_DST_BIT;
   if (device_.vk.vkCreateImage(device_.host.device, &info, nullptr, &image) != VK_SUCCESS) {
     return gpuError("vkCreateImage failed");
   }

@@ -157,11 +157,13 @@ class MetavoxelsImpl final : public Metavoxels {
     if (auto written = writeParticles(draw, steps.space, upload.particles); !written) return written;
     const std::vector<gpu::SpawnJob>& jobs = steps.spawns.jobs;
     for (std::size_t i = 0; i < jobs.size(); ++i) put(jobsAt(draw) + i * sizeof(gpu::SpawnJob), jobs[i]);
+    const auto placed = paramsOf(steps.space, draw, config_, resources_.sizes(), draws_ + 1);
+    if (!placed) return badArgument("sceneShadow.worldToMap");
     put(upload.view, viewOf(draw));
     for (std::size_t i = 0; i < steps.volumes.size(); ++i) {
       if (steps.volumes[i].drawn()) put(upload.volumes + i * kMarchStride, steps.volumes[i].placed->params);
     }
-    gpu::MetavoxelParams params = paramsOf(steps.space, draw, config_, resources_.sizes(), draws_ + 1);
+    gpu::MetavoxelParams params = *placed;
     const MetavoxelRegions& r = resources_.sizes().regions;
     const auto both = [&](std::uint64_t a, std::uint64_t b) {
       return addresses(resources_.address(a), resources_.address(b));

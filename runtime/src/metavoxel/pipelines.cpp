@@ -25,10 +25,22 @@ Code codeOf(MetavoxelPass pass) {
 }
 
 // Bindings of shaders/metavoxel*.glsl, set 1.
-enum SpaceBinding : std::uint32_t { params, poolTexels, poolFiltered, cubes, shadow, color, depth, sceneDepth, kCount };
+enum SpaceBinding : std::uint32_t {
+  params,
+  poolTexels,
+  poolFiltered,
+  cubes,
+  shadow,
+  color,
+  depth,
+  sceneDepth,
+  sceneShadow,
+  kCount
+};
 
 VkDescriptorType typeOf(std::uint32_t binding) {
   if (binding == params) return VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
+  if (binding == sceneShadow) return VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE;
   const bool filtered = binding == poolFiltered || binding == cubes;
   return filtered ? VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER : VK_DESCRIPTOR_TYPE_STORAGE_IMAGE;
 }
@@ -105,7 +117,7 @@ Result<void> MetavoxelPipelines::createLayouts() {
 Result<void> MetavoxelPipelines::createSets() {
   const std::uint32_t matters = inFlight_ * (volumes_ + 1);
   const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, matters + inFlight_},
-                                        {VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE, matters},
+                                        {VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE, matters + inFlight_},
                                         {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 2 * inFlight_},
                                         {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, kCount * inFlight_}};
   auto poolInfo = begin<VkDescriptorPoolCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO);
@@ -148,7 +160,8 @@ void MetavoxelPipelines::write(const MetavoxelResources& resources, std::uint32_
   const MetavoxelUpload upload = resources.uploadOf(inFlight);
   const VkBuffer uploads = resources.uploads.handle();
   const VkDescriptorBufferInfo spaceParams{uploads, upload.space, sizeof(gpu::MetavoxelParams)};
-  // Where the host has no depth of the scene, any image of its kind is bound, and not read.
+  // Where the host has no images of the scene, any of their kind are bound, and not read.
+  const bool shadowed = draw.sceneShadow.view != VK_NULL_HANDLE;
   const VkImageView scene = draw.sceneDepth != VK_NULL_HANDLE ? draw.sceneDepth : draw.depth;
   const VkImageView views[kCount] = {VK_NULL_HANDLE,
                                      resources.pool.view(),
@@ -157,12 +170,14 @@ void MetavoxelPipelines::write(const MetavoxelResources& resources, std::uint32_
                                      resources.shadow.view(),
                                      draw.color,
                                      draw.depth,
-                                     scene};
+                                     scene,
+                                     shadowed ? draw.sceneShadow.view : resources.shadow.view()};
   VkDescriptorImageInfo images[kCount];
   VkWriteDescriptorSet writes[kCount];
   for (std::uint32_t i = 0; i < kCount; ++i) {
     images[i] = {resources.sampler, views[i],
                  i == cubes ? VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL : VK_IMAGE_LAYOUT_GENERAL};
+    if (i == sceneShadow && shadowed) images[i].imageLayout = draw.sceneShadow.layout;
     writes[i] = writeOf(space_[inFlight], i, typeOf(i), &spaceParams, &images[i]);
   }
   device_.api.vkUpdateDescriptorSets(device_.host.device, kCount, writes, 0, nullptr);

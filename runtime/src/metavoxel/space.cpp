@@ -112,6 +112,33 @@ DrawInfo drawInfoOf(const MetavoxelDraw& draw, Look look) {
   return info;
 }
 
+// The scene's shadow map in voxels of the space. False where it is not one of this light's.
+bool addShadowMap(const Space& space, const SceneShadow& shadow, gpu::MetavoxelParams& params) {
+  constexpr double kSlack = 1e-4;  // hosts compute matrices in floats
+  Vec3d along[3];                  // what a voxel's step along each axis adds to a row
+  double at[3];                    // the rows at the space's corner
+  for (std::size_t row = 0; row < 3; ++row) {
+    const double* m = shadow.worldToMap.data() + row * 4;
+    const Vec3d way{m[0], m[1], m[2]};
+    at[row] = dot(way, space.center) + m[3];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      along[row][axis] = dot(way, space.axes[axis]) * space.voxel;
+      at[row] -= along[row][axis] * space.half;
+    }
+    const double length = std::sqrt(dot(along[row], along[row]));
+    const double light = std::abs(along[row][2]);
+    if (!std::isfinite(length) || !std::isfinite(at[row]) || !(length > 0)) return false;
+    if (row < 2 ? light > kSlack * length : light < kSlack * length) return false;
+  }
+  const auto number = [](double value) { return static_cast<float>(value); };
+  const double texels = std::max(std::hypot(along[0][0], along[1][0]), std::hypot(along[0][1], along[1][1]));
+  const double toZ = 1 / along[2][2];
+  params.mapStep = {number(along[0][0]), number(along[1][0]), number(along[0][1]), number(along[1][1])};
+  params.mapAt = {number(at[0]), number(at[1]), shadow.empty, number(std::clamp(std::ceil(texels), 2.0, 4.0))};
+  params.mapZ = {number(toZ), number(-along[2][0] * toZ), number(-along[2][1] * toZ), number(-at[2] * toZ)};
+  return true;
+}
+
 void addPlanes(const Space& space, const MetavoxelDraw& draw, gpu::MetavoxelParams& params) {
   const Vec3d forward = toDouble(draw.view.forward), right = toDouble(draw.view.right), up = toDouble(draw.view.up);
   const double tanHeight = double{draw.view.tanHalfHeight};
@@ -176,9 +203,12 @@ gpu::MarchParams viewOf(const MetavoxelDraw& draw) {
   return viewParams(drawInfoOf(draw, {}));
 }
 
-gpu::MetavoxelParams paramsOf(const Space& space, const MetavoxelDraw& draw, const MetavoxelConfig& config,
-                              const MetavoxelSizes& sizes, std::uint32_t number) {
+std::optional<gpu::MetavoxelParams> paramsOf(const Space& space, const MetavoxelDraw& draw,
+                                             const MetavoxelConfig& config, const MetavoxelSizes& sizes,
+                                             std::uint32_t number) {
   gpu::MetavoxelParams params{};
+  const bool shadowed = draw.sceneShadow.view != VK_NULL_HANDLE;
+  if (shadowed && !addShadowMap(space, draw.sceneShadow, params)) return std::nullopt;
   for (std::size_t i = 0; i < 3; ++i) {
     params.toVoxel[i] = vec4(scaled(space.axes[i], 1 / space.voxel), space.half);
     params.toWorld[i] = vec4(scaled(space.axes[i], space.voxel), space.half);
@@ -190,7 +220,8 @@ gpu::MetavoxelParams paramsOf(const Space& space, const MetavoxelDraw& draw, con
       {1.0 / (sizes.slotsX * sizes.edge), 1.0 / (sizes.slotsY * sizes.edge), 1.0 / (sizes.slotsZ * sizes.edge)}, 0);
   const std::uint32_t flags = (draw.cull ? gpu::kFlagCull : 0) |
                               (draw.attenuation == Attenuation::reciprocal ? gpu::kFlagReciprocal : 0) |
-                              (draw.sceneDepth != VK_NULL_HANDLE ? gpu::kFlagSceneDepth : 0);
+                              (draw.sceneDepth != VK_NULL_HANDLE ? gpu::kFlagSceneDepth : 0) |
+                              (shadowed ? gpu::kFlagShadowMap : 0);
   params.space = {sizes.axis, sizes.edge, sizes.inner, flags};
   params.pool = {log2Of(sizes.slotsX), log2Of(sizes.slotsY), sizes.slots(), sizes.most};
   params.limits = {static_cast<std::uint32_t>(draw.particles.size()), config.maxListEntries,

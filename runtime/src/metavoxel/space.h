@@ -35,9 +35,10 @@ std::optional<PlacedVolume> placeVolume(const Space& space, const MetavoxelDraw&
 // View, sun and scattering.
 gpu::MarchParams viewOf(const MetavoxelDraw& draw);
 
-// All but the addresses. `number` counts draws.
-gpu::MetavoxelParams paramsOf(const Space& space, const MetavoxelDraw& draw, const MetavoxelConfig& config,
-                              const MetavoxelSizes& sizes, std::uint32_t number);
+// All but the addresses. `number` counts draws. None where the scene's shadow map does not lie along the light.
+std::optional<gpu::MetavoxelParams> paramsOf(const Space& space, const MetavoxelDraw& draw,
+                                             const MetavoxelConfig& config, const MetavoxelSizes& sizes,
+                                             std::uint32_t number);
 
 }  // namespace billow::runtime
 

@@ -31,6 +31,13 @@ struct Picture {
   std::vector<float> depth;  // one a pixel
 };
 
+// Texels on the device, in VK_IMAGE_LAYOUT_GENERAL: what a game has of its scene. Destroyed before its Headless.
+class SceneImage {
+ public:
+  virtual ~SceneImage() = default;
+  virtual VkImageView view() const = 0;
+};
+
 using PassTimes = std::array<double, runtime::kMetavoxelTimestamps - 1>;
 
 class Headless {
@@ -54,6 +61,10 @@ class Headless {
   // The same with metavoxels of this renderer. `sceneDepth` is one a pixel, or empty for none.
   virtual Result<Picture> render(runtime::Renderer& renderer, runtime::Metavoxels& metavoxels,
                                  runtime::MetavoxelDraw draw, std::span<const float> sceneDepth) = 0;
+
+  // An image of one float a texel, row by row; for storage and for sampling.
+  virtual Result<std::unique_ptr<SceneImage>> sceneImage(std::uint32_t width, std::uint32_t height,
+                                                         std::span<const float> texels) = 0;
 
   // The texels of Metavoxels::shadow() after a draw, row by row.
   virtual Result<std::vector<float>> readShadow(runtime::Renderer& renderer, const runtime::Metavoxels& metavoxels) = 0;

@@ -11,6 +11,7 @@
 #ifndef BILLOW_RUNTIME_METAVOXEL_H
 #define BILLOW_RUNTIME_METAVOXEL_H
 
+#include <limits>
 #include <span>
 
 #include "billow/format/effect.h"
@@ -63,6 +64,19 @@ struct Scattering {
 // What is left of sunlight behind a voxel of optical depth d: exp(-d), or 1 / (1 + d).
 enum class Attenuation { exponential, reciprocal };
 
+// Where the scene's opaque surfaces begin on the light's way: a shadow map of the sun, of any resolution and place.
+// Voxels behind them get no sun; outside of the map nothing is shadowed. A map finer than the voxels is averaged over
+// each of them, and a coarser one is read between its texels: where four of them lie within a slope of 45 degrees as
+// one surface, else as an edge between two.
+struct SceneShadow {
+  VkImageView view = VK_NULL_HANDLE;  // optional sampled 2D image, R32F or depth, readable by the compute shader stage
+  VkImageLayout layout = VK_IMAGE_LAYOUT_GENERAL;
+  // Row-major 3x4, from the world to the map: texel x and y (whole numbers and a half at their centres), which must not
+  // change along the light, and what a surface there has written, which must.
+  std::array<double, 12> worldToMap{};
+  float empty = std::numeric_limits<float>::infinity();  // of texels without a surface; what is not finite is one too
+};
+
 inline constexpr std::uint32_t kMetavoxelTimestamps = 6;
 
 struct MetavoxelDraw {
@@ -92,6 +106,7 @@ struct MetavoxelDraw {
   VkImageView color = VK_NULL_HANDLE;  // as DrawInfo has them
   VkImageView depth = VK_NULL_HANDLE;
   VkImageView sceneDepth = VK_NULL_HANDLE;  // optional storage image R32F: distance of the scene along `forward`
+  SceneShadow sceneShadow = {};
   // Optional: kMetavoxelTimestamps queries of a timestamp pool, reset by the host, from firstTimestamp on: begin,
   // effects evaluated and binned, first round filled, lit and marched, end.
   VkQueryPool timestamps = VK_NULL_HANDLE;
@@ -106,11 +121,13 @@ struct MetavoxelStats {
   std::uint32_t listEntries = 0;  // particles in lists, whether or not there was room
 };
 
-// The shadow that the space casts on the scene.
+// The shadow that the space casts on the scene. With MetavoxelDraw::sceneShadow it ends at the scene's surfaces, so
+// that a surface that casts gets the light that has reached it; at a silhouette within a voxel's column it is the mean
+// of both.
 struct MetavoxelShadow {
   VkImage image = VK_NULL_HANDLE;
-  VkImageView view = VK_NULL_HANDLE;  // R32F in VK_IMAGE_LAYOUT_GENERAL: optical depth of the whole space, a texel a
-                                      // column of voxels; written anew by each draw
+  VkImageView view = VK_NULL_HANDLE;  // R32F in VK_IMAGE_LAYOUT_GENERAL: optical depth of the space up to the scene's
+                                      // first surface, a texel a column of voxels; written anew by each draw
   std::uint32_t size = 0;             // texels along both edges
   // Of the draw recorded last, a row each for x and y: texel = dot(row, (world, 1)), whole numbers and a half at their
   // centres.
