@@ -22,6 +22,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) buffer Quads { uve
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Floats { float items[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer Counters { MetavoxelCounters value; };
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer Rounds { MetavoxelRound items[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer Slots { MetavoxelSlot items[]; };
 
 uint cellsAxis() { return meta.space.x; }
 uint edgeTexels() { return meta.space.y; }
@@ -75,6 +76,15 @@ uint blockNumber(uint slot, uvec3 block) {
   return ((slot * n + block.z) * n + block.y) * n + block.x;
 }
 uint blockHolds(uint slot, uvec3 block) { return Words(meta.rounds.zw).items[blockNumber(slot, block)]; }
+
+// In the round whose range this is, by number: of the metavoxels drawn, and of those to fill.
+uint drawnSlot(uvec4 range, uint number) {
+  if (range.w == 0u) return number;
+  return Words(meta.cells.zw).items[Words(meta.items.xy).items[number]] - 1u;
+}
+uint filledSlot(uvec4 range, uint number) {
+  return range.w == 0u ? number : Words(meta.spare.zw).items[number];
+}
 
 uint positionOf(uvec3 cell) { return Words(meta.cells.zw).items[cellNumber(cell)] - 1u; }  // kNone where nothing is
 uint cellAt(uint position) { return Words(meta.items.zw).items[position]; }

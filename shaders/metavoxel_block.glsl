@@ -67,6 +67,7 @@ void storeBlock(Block block, Texel values[2], bool first) {
     // What has no extinction has no colour: in a block without matter nothing would light it.
     if (!(values[i].extinction > 0.0)) values[i].albedo = vec3(0.0);
     imageStore(pool, ivec3(slotCorner(block.slot) + texel), vec4(values[i].albedo, values[i].extinction));
+    keepAlbedo(block.slot, texel, values[i].albedo);
     const bool emits = values[i].emission != vec3(0.0);
     if (emits || values[i].extinction > 0.0) noteMatter(texel - block.texel, emits);
   }

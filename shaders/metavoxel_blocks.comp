@@ -64,8 +64,9 @@ void addVolumes(uint slot, uint cell, uint blocks) {
 }
 
 void main() {
-  const uint slot = gl_WorkGroupID.x;
-  const uint position = Rounds(meta.rounds.xy).items[pass.round].range.x + slot;
+  const uvec4 range = Rounds(meta.rounds.xy).items[pass.round].range;
+  const uint slot = filledSlot(range, gl_WorkGroupID.x);
+  const uint position = range.x + slot;
   const uint cell = cellAt(position);
   const uvec2 list = Pairs(meta.lists.xy).items[position];
   const bool volumes = wordOf(cell) >> kVolumeBit != 0u;

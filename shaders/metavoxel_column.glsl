@@ -14,8 +14,9 @@ struct Column {
 
 Column columnOf() {
   Column column;
-  column.slot = gl_WorkGroupID.z;
-  column.position = Rounds(meta.rounds.xy).items[pass.round].range.x + column.slot;
+  const uvec4 range = Rounds(meta.rounds.xy).items[pass.round].range;
+  column.slot = drawnSlot(range, gl_WorkGroupID.z);
+  column.position = range.x + column.slot;
   column.cell = cellOf(cellAt(column.position));
   column.block = gl_WorkGroupID.xy;
   column.texel = column.block * kSubBlock + gl_LocalInvocationID.xy;

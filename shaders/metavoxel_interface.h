@@ -13,15 +13,15 @@
 namespace billow::runtime::gpu {
 #endif
 
-BILLOW_GPU_CONST kPlanes = 5u;         // of the frustum: near, left, right, lower, upper
-BILLOW_GPU_CONST kSubBlock = 8u;       // texels an edge of what one workgroup of fill writes
-BILLOW_GPU_CONST kBlockMatter = 1u;    // of a block of texels: some have extinction or emission
-BILLOW_GPU_CONST kBlockEmission = 2u;  // some have emission; else none of the block's is written
-BILLOW_GPU_CONST kBlockNear = 4u;      // matter within it or in a texel beside it
-BILLOW_GPU_CONST kBlockStale = 8u;     // texels may be other than 0, from what the slot held before
+BILLOW_GPU_CONST kPlanes = 5u;              // of the frustum: near, left, right, lower, upper
+BILLOW_GPU_CONST kSubBlock = 8u;            // texels an edge of what one workgroup of fill writes
+BILLOW_GPU_CONST kBlockMatter = 1u;         // of a block of texels: some have extinction or emission
+BILLOW_GPU_CONST kBlockEmission = 2u;       // some have emission; else none of the block's is written
+BILLOW_GPU_CONST kBlockNear = 4u;           // matter within it or in a texel beside it
+BILLOW_GPU_CONST kBlockStale = 8u;          // texels may be other than 0, from what the slot held before
 BILLOW_GPU_CONST kAfterVolumes = 1u << 31;  // of a work item: passes of volumes come before
-BILLOW_GPU_CONST kWorkGroups = 256u;   // along x of a dispatch with a workgroup a work item
-BILLOW_GPU_CONST kVolumeBit = 24u;     // of a cell's word: below it particles are counted, from it on volumes flagged
+BILLOW_GPU_CONST kWorkGroups = 256u;        // along x of a dispatch with a workgroup a work item
+BILLOW_GPU_CONST kVolumeBit = 24u;  // of a cell's word: below it particles are counted, from it on volumes flagged
 BILLOW_GPU_CONST kUseErosion = 1u;  // of materials, all together: what none uses is left out of the code that fills
 BILLOW_GPU_CONST kUseRamps = 2u;
 BILLOW_GPU_CONST kUseCurves = 4u;
@@ -34,10 +34,14 @@ BILLOW_GPU_CONST kFlagCull = 1u;        // cells that neither the eye sees nor l
 BILLOW_GPU_CONST kFlagReciprocal = 2u;  // 1 / (1 + d) in place of exp(-d)
 BILLOW_GPU_CONST kFlagSceneDepth = 4u;  // rays end at the scene
 BILLOW_GPU_CONST kFlagShadowMap = 8u;   // light ends at the scene
+BILLOW_GPU_CONST kFlagKeep = 16u;       // metavoxels stay filled, and of those only
+BILLOW_GPU_CONST kFlagChanged = 32u;    // the changed ones are filled anew
+BILLOW_GPU_CONST kFlagNever = 64u;      // none
+BILLOW_GPU_CONST kParticleWords = 24u;
 
 // One thing to draw: the metavoxels at positions first to first + count - 1.
 struct MetavoxelRound {
-  uvec4 range;    // first, count, 1: in front of all that were drawn before, 0: behind; 0
+  uvec4 range;    // first, count, 1: in front of all that were drawn before, 0: behind; 1: slots are kept
   uvec4 blocks;   // indirect dispatch, a workgroup a metavoxel; 0
   uvec4 volumes;  // of passes with a workgroup a block of a metavoxel in which a volume is; number of those blocks
   uvec4 fill;     // the same for blocks that particles reach, or from which they are gone
@@ -46,14 +50,23 @@ struct MetavoxelRound {
 };
 BILLOW_GPU_SIZE(MetavoxelRound, 96);
 
+// A place in the pool that keeps what it was filled with.
+struct MetavoxelSlot {
+  uvec4 owner;    // cell + 1, or 0; the last draw that has drawn it; hash of the space it was filled in, or 0; 0
+  uvec4 content;  // hash of what filled it, 0, 0
+};
+BILLOW_GPU_SIZE(MetavoxelSlot, 32);
+
 struct MetavoxelCounters {
-  uvec4 wanted;  // occupied cells (more than fit are left out), list entries, the same; drawn cells; 0
+  uvec4 wanted;  // occupied cells (more than fit are left out), list entries, the same; drawn cells; filled ones
   uvec4 boxMin;  // largest of ~cell over drawn cells
   uvec4 boxMax;  // largest of cell + 1; w: number of the draw
   uvec4 reset;   // indirect dispatch of the next frame's clearing; w: 1 where everything is cleared
   uvec4 rank;    // indirect dispatch, a thread an occupied cell; w: cells in front of which later rounds are drawn
+  uvec4 check;   // indirect dispatch, a workgroup an occupied cell, where slots are kept; 0
+  uvec4 spare;   // slots that this draw may give away: those without an owner, those with one; given ones; 0
 };
-BILLOW_GPU_SIZE(MetavoxelCounters, 80);
+BILLOW_GPU_SIZE(MetavoxelCounters, 112);
 
 // Candidates of one span in one run of an effect's emitter, as the effect lies in the world. A candidate's slot is its
 // number here plus a random one in [0, 1).
@@ -90,11 +103,16 @@ struct MetavoxelParams {
   uvec4 work;     // addresses: work items of volumes; of particles (metavoxel_work.glsl)
   uvec4 emitters;  // addresses: emitters; points of tracks
   uvec4 spawn;     // address of jobs; their number; candidates, the last of the particles
+  uvec4 kept;      // addresses: a cell's last slot + 1; slots
+  uvec4 spare;     // addresses: slots to give away; slots to fill
+  uvec4 matter;    // address: albedo of each texel (RGB9E5) where metavoxels are kept; hash of the space; 0
   vec4 mapStep;    // the scene's shadow map: its texel is x * xy + y * zw, and
   vec4 mapAt;      // + xy; z: its value where no surface is; w: samples of it along a voxel's edge
   vec4 mapZ;       // voxel z = dot(xyz, (value, voxel x, voxel y)) + w
+  // Two a volume: hash of all that its matter depends on.
+  uvec4 contents[kMaxVolumes / 2u];
 };
-BILLOW_GPU_SIZE(MetavoxelParams, 32 * 16);
+BILLOW_GPU_SIZE(MetavoxelParams, 39 * 16);
 
 #ifdef __cplusplus
 }  // namespace billow::runtime::gpu

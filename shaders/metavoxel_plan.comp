@@ -10,7 +10,8 @@ layout(local_size_x = 256) in;
 
 shared uint before;
 
-void planRounds(uint items) {
+// `kept` slots, or 0 where none are.
+void planRounds(uint items, uint kept) {
   Rounds rounds = Rounds(meta.rounds.xy);
   const uint blocks = blocksAxis();
   uint next = 0u;
@@ -27,6 +28,9 @@ void planRounds(uint items) {
     rounds.items[i].march = uvec4(meta.picture.xy * march, march, 0u);
     next += count;
   }
+  if (kept == 0u) return;
+  rounds.items[0].range = uvec4(0u, kept, 0u, 1u);
+  rounds.items[0].blocks = uvec4(0u, 1u, 1u, 0u);  // grows with those that are to be filled
 }
 
 void main() {
@@ -47,7 +51,10 @@ void main() {
   const uint cells = 1u << 3u * cellBits();
   counters.value.reset = uvec4(((all ? cells : items) + 255u) / 256u, 1u, 1u, all ? 1u : 0u);
   counters.value.rank = uvec4((items + 255u) / 256u, 1u, 1u, before);
+  const bool keep = hasFlag(kFlagKeep) && whole && items != 0u;
+  counters.value.check = uvec4(keep ? items : 0u, 1u, 1u, 0u);
   counters.value.wanted.z = items;
+  counters.value.wanted.w = keep ? 0u : items;
   counters.value.boxMax.w = meta.picture.z;
-  planRounds(items);
+  planRounds(items, keep ? min(meta.pool.z, meta.pool.w) : 0u);
 }

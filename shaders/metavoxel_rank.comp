@@ -29,6 +29,21 @@ uint rankOf(uvec2 mine, uint items) {
   return rank;
 }
 
+// The slot that the cell has kept, or one of those that nobody draws.
+uint slotFor(uint cell) {
+  Slots slots = Slots(meta.kept.zw);
+  const uint kept = Words(meta.kept.xy).items[cell];
+  if (kept != 0u && slots.items[kept - 1u].owner.x == cell + 1u) return kept - 1u;
+  Counters counters = Counters(meta.ramps.zw);
+  const uint number = atomicAdd(counters.value.spare.z, 1u);
+  const uint empty = counters.value.spare.x;
+  const uint last = min(meta.pool.z, meta.pool.w) - 1u;
+  const uint slot = Words(meta.spare.xy).items[number < empty ? number : last - (number - empty)];
+  slots.items[slot].owner = uvec4(cell + 1u, meta.picture.z, 0u, 0u);
+  Words(meta.kept.xy).items[cell] = slot + 1u;
+  return slot;
+}
+
 void main() {
   Counters counters = Counters(meta.ramps.zw);
   const uint items = counters.value.wanted.z;
@@ -38,6 +53,7 @@ void main() {
   uint position = i;
   if (items > meta.pool.z) position = rankOf(uvec2(orderKey(at), cell), items);
   if (i >= items) return;
+  if (counters.value.check.x != 0u) position = slotFor(cell);
   Words(meta.cells.zw).items[cell] = position + 1u;
   Words(meta.items.zw).items[position] = cell;
   const uint count = wordOf(cell) & ((1u << kVolumeBit) - 1u);

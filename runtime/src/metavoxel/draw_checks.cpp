@@ -18,6 +18,7 @@ Result<void> checkDraw(const MetavoxelDraw& draw, const MetavoxelConfig& config)
   for (std::size_t i = 0; i < 3; ++i) {
     if (!std::isfinite(draw.center[i]) || !std::isfinite(draw.anchor[i])) return badArgument("center, anchor");
   }
+  if (draw.refill != Refill::always && !config.keepFilled) return badArgument("refill, without keepFilled,");
   for (const float share : draw.lightExtinction) {
     if (!(share >= 0) || !std::isfinite(share)) return badArgument("lightExtinction");
   }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "checks.h"
+#include "content.h"
 #include "draw_checks.h"
 #include "params.h"
 #include "pipelines.h"
@@ -58,6 +59,7 @@ class MetavoxelsImpl final : public Metavoxels {
       stats = {.draw = counters.boxMax.w,
                .occupied = counters.wanted.x,
                .drawn = counters.wanted.z,
+               .filled = counters.wanted.w,
                .listEntries = counters.wanted.y};
     }
     return stats;
@@ -96,7 +98,8 @@ class MetavoxelsImpl final : public Metavoxels {
     std::vector<VolumeSteps> volumes;
     SpawnPlan spawns;
     std::uint32_t particles;  // the host's and the effects'
-    VkPipeline clear, reset, spawn, binCount, binWrite, plan, rank, blocks, fill, sum, light, shadow, march, finish;
+    VkPipeline clear, reset, spawn, binCount, binWrite, plan, rank, blocks, fill, sum, light, shadow, march, finish,
+        keep, spare, compare;
   };
 
   Result<Steps> prepare(const MetavoxelDraw& draw) {
@@ -122,11 +125,11 @@ class MetavoxelsImpl final : public Metavoxels {
                                                             {MetavoxelPass::shadow, &steps.shadow},
                                                             {half ? marchHalf : marchSingle, &steps.march},
                                                             {half ? finishHalf : finishSingle, &steps.finish}};
-    for (const auto& [pass, place] : wanted) {
-      if (pass == spawn && !planner_.hasEffects()) continue;
-      const auto made = pipelines_.pipeline(pass);
-      if (!made) return tl::unexpected(made.error());
-      *place = *made;
+    const std::pair<MetavoxelPass, VkPipeline*> kept[] = {
+        {keep, &steps.keep}, {spare, &steps.spare}, {compare, &steps.compare}};
+    if (auto made = makeAll(wanted); !made) return tl::unexpected(made.error());
+    if (config_.keepFilled) {
+      if (auto made = makeAll(kept); !made) return tl::unexpected(made.error());
     }
     for (std::size_t i = 0; i < draw.volumes.size(); ++i) {
       auto volume = prepareVolume(steps.space, draw, i);
@@ -134,6 +137,16 @@ class MetavoxelsImpl final : public Metavoxels {
       steps.volumes.push_back(*volume);
     }
     return steps;
+  }
+
+  Result<void> makeAll(std::span<const std::pair<MetavoxelPass, VkPipeline*>> wanted) {
+    for (const auto& [pass, place] : wanted) {
+      if (pass == MetavoxelPass::spawn && !planner_.hasEffects()) continue;
+      const auto made = pipelines_.pipeline(pass);
+      if (!made) return tl::unexpected(made.error());
+      *place = *made;
+    }
+    return {};
   }
 
   Result<VolumeSteps> prepareVolume(const Space& space, const MetavoxelDraw& draw, std::size_t number) {
@@ -182,6 +195,17 @@ class MetavoxelsImpl final : public Metavoxels {
     params.spawn = both(r.jobs, 0);
     params.spawn.z = static_cast<std::uint32_t>(steps.spawns.jobs.size());
     params.spawn.w = steps.spawns.candidates;
+    params.kept = both(r.kept, r.slots);
+    params.spare = both(r.spare, r.fills);
+    params.matter = both(r.albedo, 0);
+    params.matter.z = hashOf(steps.space);
+    for (std::size_t i = 0; i < steps.volumes.size(); ++i) {
+      if (!steps.volumes[i].drawn()) continue;
+      const auto hash = hashOf(*steps.volumes[i].placed, draw.volumes[i].frame->uploadValue());
+      gpu::uvec4& two = params.contents[i / 2];
+      (i % 2 == 0 ? two.x : two.z) = hash[0];
+      (i % 2 == 0 ? two.y : two.w) = hash[1];
+    }
     put(upload.space, params);
     pipelines_.write(resources_, next_, draw);
     return {};
@@ -275,9 +299,23 @@ class MetavoxelsImpl final : public Metavoxels {
     barrier(commands);
     dispatch(commands, steps.plan, {}, {1, 1, 1});
     barrier(commands);
+    if (config_.keepFilled) recordKeep(commands, steps, rank);
     indirect(commands, steps.rank, {}, rank);
     barrier(commands);
     if (particles != 0) dispatch(commands, steps.binWrite, {}, groups);
+    barrier(commands);
+    if (!config_.keepFilled) return;
+    const std::uint64_t counters = resources_.sizes().regions.counters;
+    indirect(commands, steps.compare, {}, counters + offsetof(gpu::MetavoxelCounters, check));
+    barrier(commands);
+  }
+
+  // Which slots stay their cells', and which may be given away.
+  void recordKeep(VkCommandBuffer commands, const Steps& steps, std::uint64_t rank) {
+    const MetavoxelSizes& sizes = resources_.sizes();
+    indirect(commands, steps.keep, {}, rank);
+    barrier(commands);
+    dispatch(commands, steps.spare, {}, {(std::min(sizes.slots(), sizes.most) + 255) / 256, 1, 1});
     barrier(commands);
   }
 

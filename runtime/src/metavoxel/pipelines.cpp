@@ -19,7 +19,8 @@ Code codeOf(MetavoxelPass pass) {
       spirv::kMetavoxelBin,         spirv::kMetavoxelBin,        spirv::kMetavoxelBinVolume,
       spirv::kMetavoxelPlan,        spirv::kMetavoxelRank,       spirv::kMetavoxelBlocks,
       spirv::kMetavoxelFill,        spirv::kMetavoxelFillVolume, spirv::kMetavoxelSum,
-      spirv::kMetavoxelLight,       spirv::kMetavoxelShadow,     spirv::kMetavoxelMarchHalf,
+      spirv::kMetavoxelLight,       spirv::kMetavoxelShadow,     spirv::kMetavoxelKeep,
+      spirv::kMetavoxelSpare,       spirv::kMetavoxelCompare,    spirv::kMetavoxelMarchHalf,
       spirv::kMetavoxelMarchSingle, spirv::kMetavoxelFinishHalf, spirv::kMetavoxelFinishSingle};
   return codes[static_cast<std::size_t>(pass)];
 }

@@ -93,7 +93,7 @@ Result<void> MetavoxelResources::create(const MetavoxelConfig& config) {
   const std::uint64_t particleBytes = std::uint64_t{config.maxParticles} * sizeof(format::Particle);
   static_assert(sizeof(gpu::MetavoxelParams) <= kMarchStride);
   uploadStride_ = (kMarchStride * (2 + volumes_) + particleBytes + 255) / 256 * 256;
-  const std::uint64_t slotBytes = kTexelBytes * config.edge * config.edge * config.edge;
+  const std::uint64_t slotBytes = texelBytes(config) * config.edge * config.edge * config.edge;
   // What the device asks for is known only once objects are made, so the pool shrinks until all of it fits.
   std::uint64_t slots = config.maxMetavoxels + 63;
   for (;;) {

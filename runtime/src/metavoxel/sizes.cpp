@@ -48,6 +48,11 @@ MetavoxelRegions regionsOf(const MetavoxelConfig& config, const MetavoxelSizes& 
   regions.cellAt = region(most * 4);
   regions.lists = region(most * 8);
   regions.cursors = region(most * 4);
+  const std::uint64_t kept = config.keepFilled ? 1 : 0;
+  regions.kept = region(kept * sizes.cells() * 4);
+  regions.slots = region(kept * most * sizeof(gpu::MetavoxelSlot));
+  regions.spare = region(kept * most * 4);
+  regions.fills = region(kept * most * 4);
   regions.entries = region(std::uint64_t{config.maxListEntries} * 4);
   regions.particles = region(std::uint64_t{config.maxParticles} * sizeof(format::Particle));
   // None of a draw's jobs is empty.
@@ -61,7 +66,9 @@ MetavoxelRegions regionsOf(const MetavoxelConfig& config, const MetavoxelSizes& 
   regions.blocks = region(sizes.blocks() * 4);
   regions.volumeWork = region(sizes.blocks() * 8);
   regions.fillWork = region(sizes.blocks() * 16);
-  regions.emission = region(std::uint64_t{sizes.slots()} * sizes.edge * sizes.edge * sizes.edge * 4);
+  const std::uint64_t texels = std::uint64_t{sizes.slots()} * sizes.edge * sizes.edge * sizes.edge;
+  regions.emission = region(texels * 4);
+  regions.albedo = region(kept * texels * 4);
   regions.bytes = end;
   return regions;
 }

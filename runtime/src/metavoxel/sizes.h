@@ -11,12 +11,17 @@
 namespace billow::runtime {
 
 inline constexpr std::uint32_t kMostRounds = 256;
-inline constexpr std::uint64_t kTexelBytes = 12;  // 8 of the pool's image, 4 of emission
+
+// 8 of the pool's image, 4 of emission, and 4 of albedo where metavoxels stay filled.
+inline std::uint64_t texelBytes(const MetavoxelConfig& config) {
+  return config.keepFilled ? 16 : 12;
+}
 
 // Where the arrays of metavoxel_interface.h begin in the device's buffer.
 struct MetavoxelRegions {
-  std::uint64_t counters, rounds, words, positions, found, cellAt, lists, cursors, entries, particles, jobs, materials,
-      curves, ramps, emitters, points, columns, blocks, volumeWork, fillWork, emission;
+  std::uint64_t counters, rounds, words, positions, found, cellAt, lists, cursors, kept, slots, spare, fills, entries,
+      particles, jobs, materials, curves, ramps, emitters, points, columns, blocks, volumeWork, fillWork, emission,
+      albedo;
   std::uint64_t bytes;
 };
 

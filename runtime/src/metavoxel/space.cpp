@@ -10,6 +10,8 @@
 namespace billow::runtime {
 namespace {
 
+static_assert(sizeof(format::Particle) == gpu::kParticleWords * 4);
+
 double dot(const Vec3d& a, const Vec3d& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -218,10 +220,11 @@ std::optional<gpu::MetavoxelParams> paramsOf(const Space& space, const Metavoxel
   params.tint = vec4(toDouble(draw.lightExtinction), 1.0 / sizes.cubeLayers);
   params.texel = vec4(
       {1.0 / (sizes.slotsX * sizes.edge), 1.0 / (sizes.slotsY * sizes.edge), 1.0 / (sizes.slotsZ * sizes.edge)}, 0);
-  const std::uint32_t flags = (draw.cull ? gpu::kFlagCull : 0) |
-                              (draw.attenuation == Attenuation::reciprocal ? gpu::kFlagReciprocal : 0) |
-                              (draw.sceneDepth != VK_NULL_HANDLE ? gpu::kFlagSceneDepth : 0) |
-                              (shadowed ? gpu::kFlagShadowMap : 0);
+  const std::uint32_t flags =
+      (draw.cull ? gpu::kFlagCull : 0) | (draw.attenuation == Attenuation::reciprocal ? gpu::kFlagReciprocal : 0) |
+      (draw.sceneDepth != VK_NULL_HANDLE ? gpu::kFlagSceneDepth : 0) | (shadowed ? gpu::kFlagShadowMap : 0) |
+      (config.keepFilled ? gpu::kFlagKeep : 0) | (draw.refill == Refill::changed ? gpu::kFlagChanged : 0) |
+      (draw.refill == Refill::never ? gpu::kFlagNever : 0);
   params.space = {sizes.axis, sizes.edge, sizes.inner, flags};
   params.pool = {log2Of(sizes.slotsX), log2Of(sizes.slotsY), sizes.slots(), sizes.most};
   params.limits = {static_cast<std::uint32_t>(draw.particles.size()), config.maxListEntries,

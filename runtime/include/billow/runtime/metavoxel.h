@@ -32,6 +32,7 @@ struct MetavoxelConfig {
   std::uint32_t maxListEntries = 1u << 20;  // particles in metavoxels' lists, all together; further ones are left out
   std::uint32_t maxVolumes = 4;             // of a draw, 0 to 8
   std::uint32_t recordsInFlight = 3;        // record() calls whose commands may be pending at once, at least 1
+  bool keepFilled = false;  // metavoxels stay filled from draw to draw, for MetavoxelDraw::refill: 4 bytes more a texel
   // Effects, and materials, curves, ramps, maps and tracks of the particles; kept to the format's rules (those of an
   // open pack are). Read by create() alone. Without them there are no particles.
   const format::EffectTables* tables = nullptr;
@@ -63,6 +64,15 @@ struct Scattering {
 
 // What is left of sunlight behind a voxel of optical depth d: exp(-d), or 1 / (1 + d).
 enum class Attenuation { exponential, reciprocal };
+
+// Which of a draw's metavoxels are filled; all are lit. A host that fills every n-th draw asks for never in between.
+// Metavoxels stay filled while the space lies where it lay and the pool has room for all of a draw at once, even those
+// that a moving eye has lost sight of; else all are filled.
+enum class Refill {
+  always,
+  changed,  // those that were filled from other particles, volumes, looks or places, as the GPU finds
+  never,    // those that are new in the pool; what else has changed is not seen
+};
 
 // Where the scene's opaque surfaces begin on the light's way: a shadow map of the sun, of any resolution and place.
 // Voxels behind them get no sun; outside of the map nothing is shadowed. A map finer than the voxels is averaged over
@@ -97,9 +107,10 @@ struct MetavoxelDraw {
   std::span<const MetavoxelVolume> volumes = {};
   std::span<const format::Particle> particles = {};  // those of radius 0 are not there
   std::span<const MetavoxelEffect> effects = {};     // their particles come behind those of the host
-  float step = 1;       // of the march, in voxels along the direction of view, >= kLeastStep
-  bool jitter = false;  // displace each pixel's steps by a fixed pattern: noise in place of bands
-  bool cull = true;     // leave out what neither the eye sees nor light passes on its way to what it may see
+  float step = 1;                  // of the march, in voxels along the direction of view, >= kLeastStep
+  bool jitter = false;             // displace each pixel's steps by a fixed pattern: noise in place of bands
+  Refill refill = Refill::always;  // always, where MetavoxelConfig::keepFilled is not set
+  bool cull = true;                // leave out what neither the eye sees nor light passes on its way to what it may see
   Background background = {};
   std::uint32_t width = 0, height = 0;  // of all images
   ColorFormat colorFormat = ColorFormat::half;
@@ -118,6 +129,7 @@ struct MetavoxelStats {
   std::uint32_t draw = 0;         // counts from 1
   std::uint32_t occupied = 0;     // metavoxels in which something is, whether or not they were drawn
   std::uint32_t drawn = 0;        // at most maxMetavoxels
+  std::uint32_t filled = 0;       // of those drawn
   std::uint32_t listEntries = 0;  // particles in lists, whether or not there was room
 };
 
