@@ -8,6 +8,8 @@
 
 layout(local_size_x = 8, local_size_y = 8, local_size_z = 4) in;
 
+layout(constant_id = 6) const bool kWeighted = false;  // colours are means weighted by extinction, not maxima
+
 struct Block {
   uint slot;
   uvec3 cell;
@@ -49,6 +51,12 @@ void noteMatter(uvec3 inBlock, bool emits) {
   if ((touched & bits) != bits) atomicOr(touched, bits);
 }
 
+// Colour of two amounts of extinction that meet.
+vec3 blended(Texel a, Texel b) {
+  if (!kWeighted) return max(a.albedo, b.albedo);
+  return (a.albedo * a.extinction + b.albedo * b.extinction) / max(a.extinction + b.extinction, 1e-30);
+}
+
 // Writes the thread's two texels, added to what earlier passes left (`old`, of loadTexel), and what the block holds.
 // Called by all threads of the group.
 void storeBlock(Block block, Texel values[2], bool first) {
@@ -62,7 +70,7 @@ void storeBlock(Block block, Texel values[2], bool first) {
     const uvec3 texel = texelOf(block, i);
     if (any(greaterThanEqual(texel, uvec3(edgeTexels())))) continue;
     const Texel old = loadTexel(block.slot, texel, before);
-    values[i] = Texel(max(old.albedo, values[i].albedo), min(old.extinction + values[i].extinction, kLargestHalf),
+    values[i] = Texel(blended(old, values[i]), min(old.extinction + values[i].extinction, kLargestHalf),
                       old.emission + values[i].emission);
     // What has no extinction has no colour: in a block without matter nothing would light it.
     if (!(values[i].extinction > 0.0)) values[i].albedo = vec3(0.0);

@@ -42,7 +42,7 @@ void main() {
   const uint cell = Words(meta.items.xy).items[gl_WorkGroupID.x];
   const uint slot = positionOf(cellOf(cell));
   const uvec2 list = Pairs(meta.lists.xy).items[slot];
-  if (i == 0u) low = high = 0u;
+  if (i == 0u) low = high = meta.matter.w;
   barrier();
   for (uint at = i; at < list.y; at += 64u) addHash(hashOf(Words(meta.entries.xy).items[list.x + at]));
   if (i < meta.limits.z && (wordOf(cell) >> (kVolumeBit + i) & 1u) != 0u) {

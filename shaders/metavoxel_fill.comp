@@ -1,6 +1,5 @@
-// Particles into the metavoxels of a round. Extinction and
-// emission add, diffuse colour takes the maximum. Sums are of integers, so that the order of a list, which nobody
-// chooses, changes nothing.
+// Particles into the metavoxels of a round. Extinction and emission add, diffuse colour takes the maximum or the mean.
+// Sums are of integers, so that the order of a list, which nobody chooses, changes nothing.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_buffer_reference : require
@@ -25,6 +24,7 @@ struct Sums {
   uint extinction;
   uvec3 emission;
   vec3 albedo;
+  uvec3 weighted;  // albedo times extinction, in units of that
 };
 
 // Both are at most kMostUnits, and so is the result: the order of additions makes no difference.
@@ -60,7 +60,10 @@ void add(Particle particle, ParticleMaterial material, vec3 apart, inout Sums su
       sums.emission[c] = added(sums.emission[c], units(matter.emission[c] * edge, kEmissionUnits));
     }
   }
-  sums.albedo = max(sums.albedo, matter.diffuse);
+  if (!kWeighted) sums.albedo = max(sums.albedo, matter.diffuse);
+  for (int i = 0; i < 3 && kWeighted; ++i) {
+    sums.weighted[i] = added(sums.weighted[i], units(matter.extinction * edge * matter.diffuse[i], kExtinctionUnits));
+  }
 }
 
 // A particle into both texels of the thread. Most of it is read only where its bounding sphere is.
@@ -104,7 +107,7 @@ void main() {
   Sums sums[2];
   for (uint i = 0u; i < 2u; ++i) {
     places[i] = worldOf(texelVoxel(block.cell, texelOf(block, i)));
-    sums[i] = Sums(0u, uvec3(0u), vec3(0.0));
+    sums[i] = Sums(0u, uvec3(0u), vec3(0.0), uvec3(0u));
   }
   for (uint at = 0u; at < item.w; at += kBatch) {
     collect(block, item.zw, at);
@@ -112,6 +115,7 @@ void main() {
   }
   Texel values[2];
   for (uint i = 0u; i < 2u; ++i) {
+    if (kWeighted) sums[i].albedo = vec3(sums[i].weighted) / float(max(sums[i].extinction, 1u));
     values[i] =
         Texel(sums[i].albedo, float(sums[i].extinction) / kExtinctionUnits, vec3(sums[i].emission) / kEmissionUnits);
   }

@@ -26,7 +26,7 @@ BILLOW_GPU_CONST kUseErosion = 1u;  // of materials, all together: what none use
 BILLOW_GPU_CONST kUseRamps = 2u;
 BILLOW_GPU_CONST kUseCurves = 4u;
 BILLOW_GPU_CONST kMaxVolumes = 8u;
-BILLOW_GPU_CONST kBinRow = 32768u;  // particles that are binned side by side: devices may not dispatch 65536
+BILLOW_GPU_CONST kBinRow = 32768u;       // particles that are binned side by side: devices may not dispatch 65536
 BILLOW_GPU_CONST kCubeLayers = 6u;       // of a cube map: faces, each with a border of one texel
 BILLOW_GPU_CONST kCubeFaceTexels = 66u;  // an edge, border included
 
@@ -85,27 +85,27 @@ struct MetavoxelParams {
   vec4 toWorld[3];       // world step of a voxel along each axis of the space; w: middle of the space, in voxels
   vec4 eye;              // world - centre; w: voxel edge in world units
   vec4 planes[kPlanes];  // inside where dot(plane.xyz, voxel) + plane.w >= 0
-  vec4 tint;      // extinction of red, green and blue light on its way from the sun, as multiples of the extinction;
-                  // w: depth of a layer in the image of cube maps
-  vec4 texel;     // of the pool, in texture coordinates; 0
-  uvec4 space;    // cells an axis, edge, inner, flags
-  uvec4 pool;     // log2 of slots along x and along y, slots, most occupied cells
-  uvec4 limits;   // particles, list entries, volumes, rounds
-  uvec4 picture;  // workgroups of the march along x, along y; number of the draw; bits of a cell's number an axis
-  uvec4 cells;    // addresses (low, high): words; positions + 1, 0 where nothing is drawn
-  uvec4 items;    // addresses: occupied cells in the order of their finding; cells by position
-  uvec4 lists;    // addresses: first and count of the list at each position; cursors into them
-  uvec4 entries;  // addresses: particle numbers of all lists; particles
-  uvec4 texels;   // addresses: emission of each texel of the pool (RGB9E5); optical depth of columns by position
-  uvec4 tables;   // addresses: materials; curves
-  uvec4 ramps;    // addresses: ramps; counters
-  uvec4 rounds;   // addresses: rounds; what the pool's blocks of texels hold
-  uvec4 work;     // addresses: work items of volumes; of particles (metavoxel_work.glsl)
+  vec4 tint;       // extinction of red, green and blue light on its way from the sun, as multiples of the extinction;
+                   // w: depth of a layer in the image of cube maps
+  vec4 texel;      // of the pool, in texture coordinates; 0
+  uvec4 space;     // cells an axis, edge, inner, flags
+  uvec4 pool;      // log2 of slots along x and along y, slots, most occupied cells
+  uvec4 limits;    // particles, list entries, volumes, rounds
+  uvec4 picture;   // workgroups of the march along x, along y; number of the draw; bits of a cell's number an axis
+  uvec4 cells;     // addresses (low, high): words; positions + 1, 0 where nothing is drawn
+  uvec4 items;     // addresses: occupied cells in the order of their finding; cells by position
+  uvec4 lists;     // addresses: first and count of the list at each position; cursors into them
+  uvec4 entries;   // addresses: particle numbers of all lists; particles
+  uvec4 texels;    // addresses: emission of each texel of the pool (RGB9E5); optical depth of columns by position
+  uvec4 tables;    // addresses: materials; curves
+  uvec4 ramps;     // addresses: ramps; counters
+  uvec4 rounds;    // addresses: rounds; what the pool's blocks of texels hold
+  uvec4 work;      // addresses: work items of volumes; of particles (metavoxel_work.glsl)
   uvec4 emitters;  // addresses: emitters; points of tracks
   uvec4 spawn;     // address of jobs; their number; candidates, the last of the particles
   uvec4 kept;      // addresses: a cell's last slot + 1; slots
   uvec4 spare;     // addresses: slots to give away; slots to fill
-  uvec4 matter;    // address: albedo of each texel (RGB9E5) where metavoxels are kept; hash of the space; 0
+  uvec4 matter;    // address: albedo of each texel (RGB9E5) where they are kept; hash of the space; 1: weighted blend
   vec4 mapStep;    // the scene's shadow map: its texel is x * xy + y * zw, and
   vec4 mapAt;      // + xy; z: its value where no surface is; w: samples of it along a voxel's edge
   vec4 mapZ;       // voxel z = dot(xyz, (value, voxel x, voxel y)) + w

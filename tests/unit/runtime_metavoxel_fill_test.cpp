@@ -161,6 +161,35 @@ TEST_F(MetavoxelFill, DensitiesAddAndColoursTakeTheLargest) {
   EXPECT_EQ(middle[2], 0);
 }
 
+TEST_F(MetavoxelFill, WeightedColoursAreMeans) {
+  const auto metavoxels = make(smallConfig());
+  MetavoxelDraw draw = smallDraw();
+  draw.sun.irradiance = {0, 0, 0};
+  draw.scattering.ambient = {1, 1, 1};
+  draw.blend = runtime::Blend::weighted;
+  // Three times as much red as green within the small ball, and blue that only glows.
+  Particle red = ball({0, 0, 0}, 2, 0.9f, kHard), green = ball({0, 0, 0}, 2, 0.3f, kHard), glow = green;
+  red.diffuse[1] = red.diffuse[2] = green.diffuse[0] = green.diffuse[2] = 0;
+  glow.extinction = 0;
+  glow.emission[0] = 1e-5f;
+  std::vector<Particle> particles{red, green, glow};
+  draw.particles = particles;
+  const headless::Picture first = render(*metavoxels, draw);
+  for (std::size_t i = 0; i < first.rgba.size(); i += 4) {
+    if (first.rgba[i + 3] < 0.1f) continue;
+    EXPECT_NEAR(first.rgba[i] / first.rgba[i + 3], 0.75, 1e-3);
+    EXPECT_NEAR(first.rgba[i + 1] / first.rgba[i + 3], 0.25, 1e-3);
+    EXPECT_EQ(first.rgba[i + 2], 0);
+  }
+  EXPECT_GT(first.rgba[(24 * 48 + 24) * 4 + 3], 0.9f);
+  std::swap(particles[0], particles[2]);
+  EXPECT_LT(largestDifference(first, render(*metavoxels, draw)), 2e-4f);
+  draw.blend = runtime::Blend::maximum;
+  const headless::Picture largest = render(*metavoxels, draw);
+  const float* middle = &largest.rgba[(24 * 48 + 24) * 4];
+  EXPECT_NEAR(middle[2] / middle[3], 1, 1e-3) << "a maximum does not ask how much there is";
+}
+
 TEST_F(MetavoxelFill, EmissionAddsAndNeedsNoLight) {
   const auto metavoxels = make(smallConfig());
   MetavoxelDraw draw = smallDraw();

@@ -78,6 +78,8 @@ TEST_F(MetavoxelRefill, NothingIsFilledTwice) {
   EXPECT_EQ(drawAndCompare(*metavoxels, draw), 0u);
   draw.attenuation = runtime::Attenuation::reciprocal;
   EXPECT_EQ(drawAndCompare(*metavoxels, draw), 0u);
+  draw.blend = runtime::Blend::weighted;
+  EXPECT_EQ(drawAndCompare(*metavoxels, draw), metavoxels->stats().drawn) << "blending is";
   draw.refill = Refill::always;
   render(*metavoxels, draw);
   EXPECT_EQ(metavoxels->stats().filled, metavoxels->stats().drawn);

@@ -182,5 +182,30 @@ TEST_F(MetavoxelVolumes, TwoVolumesAdd) {
   EXPECT_GT(pictureDecibels(whole, sum), 60);
 }
 
+TEST_F(MetavoxelVolumes, WeightedColoursAreMeans) {
+  const format::Pack pack = openPack(cloudPack(false));
+  const auto frame = upload(*renderer_, pack);
+  runtime::Look red = cloudLook(), green = cloudLook();
+  red.extinctionScale = 3;
+  red.albedo = {0.8f, 0, 0};
+  green.extinctionScale = 1;
+  green.albedo = {0, 0.8f, 0};
+  MetavoxelDraw draw = cloudDraw(red);
+  draw.sun.irradiance = {0, 0, 0};
+  draw.scattering.ambient = {1, 1, 1};
+  draw.blend = runtime::Blend::weighted;
+  const std::vector<MetavoxelVolume> two{{.frame = frame.get(), .look = red}, {.frame = frame.get(), .look = green}};
+  draw.volumes = two;
+  const headless::Picture picture = renderOnce(smallConfig(), draw);
+  int seen = 0;
+  for (std::size_t i = 0; i < picture.rgba.size(); i += 4) {
+    if (picture.rgba[i + 3] < 0.1f) continue;
+    ++seen;
+    EXPECT_NEAR(picture.rgba[i] / picture.rgba[i + 3], 0.6, 2e-3);
+    EXPECT_NEAR(picture.rgba[i + 1] / picture.rgba[i + 3], 0.2, 2e-3);
+  }
+  EXPECT_GT(seen, 500);
+}
+
 }  // namespace
 }  // namespace billow::tests

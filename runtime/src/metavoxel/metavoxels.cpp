@@ -110,6 +110,7 @@ class MetavoxelsImpl final : public Metavoxels {
     steps.spawns = std::move(*spawns);
     steps.particles = static_cast<std::uint32_t>(draw.particles.size()) + steps.spawns.candidates;
     const bool half = draw.colorFormat == ColorFormat::half;
+    const bool weighted = draw.blend == Blend::weighted;
     using enum MetavoxelPass;
     const std::pair<MetavoxelPass, VkPipeline*> wanted[] = {{clear, &steps.clear},
                                                             {reset, &steps.reset},
@@ -119,7 +120,7 @@ class MetavoxelsImpl final : public Metavoxels {
                                                             {plan, &steps.plan},
                                                             {rank, &steps.rank},
                                                             {blocks, &steps.blocks},
-                                                            {fill, &steps.fill},
+                                                            {weighted ? fillWeighted : fill, &steps.fill},
                                                             {sum, &steps.sum},
                                                             {light, &steps.light},
                                                             {MetavoxelPass::shadow, &steps.shadow},
@@ -157,7 +158,9 @@ class MetavoxelsImpl final : public Metavoxels {
     if (!steps.placed) return badArgument("volumes[" + std::to_string(number) + "].objectToWorld");
     const auto bin = pipelines_.pipeline(MetavoxelPass::binVolume, frame.indices());
     if (!bin) return tl::unexpected(bin.error());
-    const auto fill = pipelines_.pipeline(MetavoxelPass::fillVolume, frame.indices());
+    const bool weighted = draw.blend == Blend::weighted;
+    const auto fill =
+        pipelines_.pipeline(weighted ? MetavoxelPass::fillVolumeWeighted : MetavoxelPass::fillVolume, frame.indices());
     if (!fill) return tl::unexpected(fill.error());
     steps.bin = *bin;
     steps.fill = *fill;
@@ -177,27 +180,10 @@ class MetavoxelsImpl final : public Metavoxels {
       if (steps.volumes[i].drawn()) put(upload.volumes + i * kMarchStride, steps.volumes[i].placed->params);
     }
     gpu::MetavoxelParams params = *placed;
-    const MetavoxelRegions& r = resources_.sizes().regions;
-    const auto both = [&](std::uint64_t a, std::uint64_t b) {
-      return addresses(resources_.address(a), resources_.address(b));
-    };
-    params.cells = both(r.words, r.positions);
-    params.items = both(r.found, r.cellAt);
-    params.lists = both(r.lists, r.cursors);
-    params.entries = both(r.entries, r.particles);
-    params.texels = both(r.emission, r.columns);
-    params.tables = both(r.materials, r.curves);
-    params.ramps = both(r.ramps, r.counters);
-    params.rounds = both(r.rounds, r.blocks);
-    params.work = both(r.volumeWork, r.fillWork);
+    resources_.addAddresses(params);
     params.limits.x = steps.particles;
-    params.emitters = both(r.emitters, r.points);
-    params.spawn = both(r.jobs, 0);
     params.spawn.z = static_cast<std::uint32_t>(steps.spawns.jobs.size());
     params.spawn.w = steps.spawns.candidates;
-    params.kept = both(r.kept, r.slots);
-    params.spare = both(r.spare, r.fills);
-    params.matter = both(r.albedo, 0);
     params.matter.z = hashOf(steps.space);
     for (std::size_t i = 0; i < steps.volumes.size(); ++i) {
       if (!steps.volumes[i].drawn()) continue;

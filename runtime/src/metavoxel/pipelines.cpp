@@ -14,14 +14,14 @@ using Code = std::span<const std::uint32_t>;
 
 // In the order of MetavoxelPass.
 Code codeOf(MetavoxelPass pass) {
-  static const Code codes[] = {
-      spirv::kMetavoxelClear,       spirv::kMetavoxelReset,      spirv::kMetavoxelSpawn,
-      spirv::kMetavoxelBin,         spirv::kMetavoxelBin,        spirv::kMetavoxelBinVolume,
-      spirv::kMetavoxelPlan,        spirv::kMetavoxelRank,       spirv::kMetavoxelBlocks,
-      spirv::kMetavoxelFill,        spirv::kMetavoxelFillVolume, spirv::kMetavoxelSum,
-      spirv::kMetavoxelLight,       spirv::kMetavoxelShadow,     spirv::kMetavoxelKeep,
-      spirv::kMetavoxelSpare,       spirv::kMetavoxelCompare,    spirv::kMetavoxelMarchHalf,
-      spirv::kMetavoxelMarchSingle, spirv::kMetavoxelFinishHalf, spirv::kMetavoxelFinishSingle};
+  static const Code codes[] = {spirv::kMetavoxelClear,      spirv::kMetavoxelReset,       spirv::kMetavoxelSpawn,
+                               spirv::kMetavoxelBin,        spirv::kMetavoxelBin,         spirv::kMetavoxelBinVolume,
+                               spirv::kMetavoxelPlan,       spirv::kMetavoxelRank,        spirv::kMetavoxelBlocks,
+                               spirv::kMetavoxelFill,       spirv::kMetavoxelFillVolume,  spirv::kMetavoxelFill,
+                               spirv::kMetavoxelFillVolume, spirv::kMetavoxelSum,         spirv::kMetavoxelLight,
+                               spirv::kMetavoxelShadow,     spirv::kMetavoxelKeep,        spirv::kMetavoxelSpare,
+                               spirv::kMetavoxelCompare,    spirv::kMetavoxelMarchHalf,   spirv::kMetavoxelMarchSingle,
+                               spirv::kMetavoxelFinishHalf, spirv::kMetavoxelFinishSingle};
   return codes[static_cast<std::size_t>(pass)];
 }
 
@@ -149,9 +149,10 @@ Result<VkPipeline> MetavoxelPipelines::pipeline(MetavoxelPass pass, const FrameI
   // The place first, so that no pipeline is lost where there is no memory for it.
   VkPipeline& place = pipelines_[key];
   if (place != VK_NULL_HANDLE) return place;
+  const bool weighted = pass == MetavoxelPass::fillWeighted || pass == MetavoxelPass::fillVolumeWeighted;
   const std::uint32_t constants[] = {
       grids.index, gpu::kFilterTrilinear, gpu::kFilterNone, grids.grids, pass == MetavoxelPass::binWrite ? 1u : 0u,
-      uses_};
+      uses_,       weighted ? 1u : 0u};
   auto made = makeComputePipeline(device_, layout_, codeOf(pass), constants);
   if (made) place = *made;
   return made;

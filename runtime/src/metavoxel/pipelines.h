@@ -23,6 +23,8 @@ enum class MetavoxelPass : std::uint32_t {
   blocks,
   fill,
   fillVolume,
+  fillWeighted,
+  fillVolumeWeighted,
   sum,
   light,
   shadow,

@@ -5,6 +5,8 @@
 #include <cstring>
 #include <utility>
 
+#include "params.h"
+
 namespace billow::runtime {
 namespace {
 
@@ -86,6 +88,26 @@ MetavoxelUpload MetavoxelResources::uploadOf(std::uint32_t inFlight) const {
   const std::uint64_t at = inFlight * uploadStride_;
   const std::uint64_t space = at + kMarchStride * (1 + volumes_);
   return {.view = at, .volumes = at + kMarchStride, .space = space, .particles = space + kMarchStride};
+}
+
+void MetavoxelResources::addAddresses(gpu::MetavoxelParams& params) const {
+  const MetavoxelRegions& r = sizes_.regions;
+  const auto both = [&](std::uint64_t a, std::uint64_t b) { return addresses(address(a), address(b)); };
+  params.cells = both(r.words, r.positions);
+  params.items = both(r.found, r.cellAt);
+  params.lists = both(r.lists, r.cursors);
+  params.entries = both(r.entries, r.particles);
+  params.texels = both(r.emission, r.columns);
+  params.tables = both(r.materials, r.curves);
+  params.ramps = both(r.ramps, r.counters);
+  params.rounds = both(r.rounds, r.blocks);
+  params.work = both(r.volumeWork, r.fillWork);
+  params.emitters = both(r.emitters, r.points);
+  params.spawn = both(r.jobs, 0);
+  params.kept = both(r.kept, r.slots);
+  params.spare = both(r.spare, r.fills);
+  params.matter.x = both(r.albedo, 0).x;
+  params.matter.y = both(r.albedo, 0).y;
 }
 
 Result<void> MetavoxelResources::create(const MetavoxelConfig& config) {

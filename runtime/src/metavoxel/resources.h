@@ -32,6 +32,8 @@ class MetavoxelResources {
   VkDeviceAddress address(std::uint64_t region) const { return arrays.address() + region; }
   MetavoxelUpload uploadOf(std::uint32_t inFlight) const;
   std::uint64_t bytes() const;
+  // Where the arrays lie.
+  void addAddresses(gpu::MetavoxelParams& params) const;
 
   // Makes images usable, empties the tables of cells and copies the particles' tables. For the first draw.
   void recordFirst(VkCommandBuffer commands) const;

@@ -229,6 +229,7 @@ std::optional<gpu::MetavoxelParams> paramsOf(const Space& space, const Metavoxel
   params.pool = {log2Of(sizes.slotsX), log2Of(sizes.slotsY), sizes.slots(), sizes.most};
   params.limits = {static_cast<std::uint32_t>(draw.particles.size()), config.maxListEntries,
                    static_cast<std::uint32_t>(draw.volumes.size()), sizes.rounds};
+  params.matter.w = draw.blend == Blend::weighted ? 1 : 0;
   params.picture = {(draw.width + 7) / 8, (draw.height + 7) / 8, number, sizes.cellBits()};
   return params;
 }

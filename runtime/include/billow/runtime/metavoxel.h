@@ -65,12 +65,15 @@ struct Scattering {
 // What is left of sunlight behind a voxel of optical depth d: exp(-d), or 1 / (1 + d).
 enum class Attenuation { exponential, reciprocal };
 
+// Of the diffuse colours that meet in a voxel: the largest of each channel, or their mean weighted by extinction.
+enum class Blend { maximum, weighted };
+
 // Which of a draw's metavoxels are filled; all are lit. A host that fills every n-th draw asks for never in between.
 // Metavoxels stay filled while the space lies where it lay and the pool has room for all of a draw at once, even those
 // that a moving eye has lost sight of; else all are filled.
 enum class Refill {
   always,
-  changed,  // those that were filled from other particles, volumes, looks or places, as the GPU finds
+  changed,  // those that were filled from other particles, volumes, looks, places or blends, as the GPU finds
   never,    // those that are new in the pool; what else has changed is not seen
 };
 
@@ -107,8 +110,9 @@ struct MetavoxelDraw {
   std::span<const MetavoxelVolume> volumes = {};
   std::span<const format::Particle> particles = {};  // those of radius 0 are not there
   std::span<const MetavoxelEffect> effects = {};     // their particles come behind those of the host
-  float step = 1;                  // of the march, in voxels along the direction of view, >= kLeastStep
-  bool jitter = false;             // displace each pixel's steps by a fixed pattern: noise in place of bands
+  float step = 1;       // of the march, in voxels along the direction of view, >= kLeastStep
+  bool jitter = false;  // displace each pixel's steps by a fixed pattern: noise in place of bands
+  Blend blend = Blend::maximum;
   Refill refill = Refill::always;  // always, where MetavoxelConfig::keepFilled is not set
   bool cull = true;                // leave out what neither the eye sees nor light passes on its way to what it may see
   Background background = {};
