@@ -22,10 +22,13 @@ float halfToFloat(std::uint16_t half) {
 
 class SceneImageImpl final : public SceneImage {
  public:
-  explicit SceneImageImpl(const VulkanDevice& device) : target(device) {}
+  SceneImageImpl(const VulkanDevice& device, std::uint32_t w, std::uint32_t h, std::size_t floats)
+      : target(device), width(w), height(h), count(floats) {}
   VkImageView view() const override { return target.view; }
 
   Target target;
+  std::uint32_t width, height;
+  std::size_t count;  // floats
 };
 
 class HeadlessImpl final : public Headless {
@@ -81,12 +84,14 @@ class HeadlessImpl final : public Headless {
 
   Result<std::unique_ptr<SceneImage>> sceneImage(std::uint32_t width, std::uint32_t height,
                                                  std::span<const float> texels) override {
-    auto made = std::make_unique<SceneImageImpl>(device_);
+    auto made = std::make_unique<SceneImageImpl>(device_, width, height, texels.size());
+    const bool single = texels.size() == std::size_t{width} * height;
+    const VkFormat format = single ? VK_FORMAT_R32_SFLOAT : VK_FORMAT_R32G32B32A32_SFLOAT;
     Target staging(device_);
     if (auto done = staging.makeBuffer(texels.size_bytes(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT); !done) {
       return tl::unexpected(done.error());
     }
-    if (auto done = made->target.makeImage(VK_FORMAT_R32_SFLOAT, width, height); !done) {
+    if (auto done = made->target.makeImage(format, width, height); !done) {
       return tl::unexpected(done.error());
     }
     std::memcpy(staging.mapped, texels.data(), texels.size_bytes());
@@ -94,6 +99,28 @@ class HeadlessImpl final : public Headless {
     fillImage(made->target.image, width, height, staging.buffer);
     if (auto done = submitAndWait(VK_NULL_HANDLE, 0); !done) return tl::unexpected(done.error());
     return std::unique_ptr<SceneImage>(std::move(made));
+  }
+
+  Result<std::vector<float>> read(const SceneImage& image) override {
+    const auto& from = static_cast<const SceneImageImpl&>(image);
+    Target out(device_);
+    if (auto done = out.makeBuffer(from.count * 4, VK_BUFFER_USAGE_TRANSFER_DST_BIT); !done) {
+      return tl::unexpected(done.error());
+    }
+    const auto copy = [&](VkCommandBuffer) -> Result<void> {
+      copyImage(from.target.image, from.width, from.height, out.buffer, 0);
+      barrier(VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_2_HOST_BIT,
+              VK_ACCESS_2_HOST_READ_BIT);
+      return {};
+    };
+    if (auto done = run(copy); !done) return tl::unexpected(done.error());
+    return std::vector<float>(out.mapped, out.mapped + from.count);
+  }
+
+  Result<void> run(const std::function<Result<void>(VkCommandBuffer)>& record) override {
+    beginCommands();
+    if (auto done = record(commands_); !done) return done;
+    return submitAndWait(VK_NULL_HANDLE, 0);
   }
 
   Result<std::vector<float>> readShadow(runtime::Renderer& renderer, const runtime::Metavoxels& metavoxels) override {

@@ -6,6 +6,10 @@
 
 namespace billow::runtime::spirv {
 using std::uint32_t;
+#include "composite_half_half.spv.h"
+#include "composite_half_single.spv.h"
+#include "composite_single_half.spv.h"
+#include "composite_single_single.spv.h"
 #include "march_half.spv.h"
 #include "march_single.spv.h"
 #include "metavoxel_bin.spv.h"

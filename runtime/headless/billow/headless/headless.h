@@ -62,9 +62,14 @@ class Headless {
   virtual Result<Picture> render(runtime::Renderer& renderer, runtime::Metavoxels& metavoxels,
                                  runtime::MetavoxelDraw draw, std::span<const float> sceneDepth) = 0;
 
-  // An image of one float a texel, row by row; for storage and for sampling.
+  // An image of one or four floats a texel, row by row; for storage and for sampling.
   virtual Result<std::unique_ptr<SceneImage>> sceneImage(std::uint32_t width, std::uint32_t height,
                                                          std::span<const float> texels) = 0;
+
+  virtual Result<std::vector<float>> read(const SceneImage& image) = 0;
+
+  // Runs what `record` records, and waits for it.
+  virtual Result<void> run(const std::function<Result<void>(VkCommandBuffer)>& record) = 0;
 
   // The texels of Metavoxels::shadow() after a draw, row by row.
   virtual Result<std::vector<float>> readShadow(runtime::Renderer& renderer, const runtime::Metavoxels& metavoxels) = 0;

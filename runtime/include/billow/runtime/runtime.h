@@ -221,6 +221,7 @@ class Renderer {
 
  private:
   friend class Metavoxels;  // metavoxel.h
+  friend class Compositor;  // composite.h
   virtual Device& device() = 0;
 };
 
