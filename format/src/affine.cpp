@@ -35,4 +35,14 @@ void invert(const double (&m)[12], double (&inverse)[12]) {
   }
 }
 
+void compose(std::span<const double, 12> outer, const double (&inner)[12], double (&product)[12]) {
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 4; ++column) {
+      double sum = column == 3 ? outer[row * 4 + 3] : 0;
+      for (std::size_t i = 0; i < 3; ++i) sum += outer[row * 4 + i] * inner[i * 4 + column];
+      product[row * 4 + column] = sum;
+    }
+  }
+}
+
 }  // namespace billow::format

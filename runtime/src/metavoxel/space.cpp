@@ -55,17 +55,6 @@ Vec3d perpendicular(const Vec3d& z) {
   return unit(minus(x, scaled(z, dot(x, z))));
 }
 
-// Index to the scene's world.
-void compose(const std::array<double, 12>& outer, const double (&inner)[12], double (&product)[12]) {
-  for (std::size_t row = 0; row < 3; ++row) {
-    for (std::size_t column = 0; column < 4; ++column) {
-      double sum = column == 3 ? outer[row * 4 + 3] : 0;
-      for (std::size_t i = 0; i < 3; ++i) sum += outer[row * 4 + i] * inner[i * 4 + column];
-      product[row * 4 + column] = sum;
-    }
-  }
-}
-
 // Widens [low, high] (voxels of the space) by what a grid's active voxels reach.
 void addReach(const Space& space, const format::GridFrame& frame, Vec3d& low, Vec3d& high) {
   for (int corner = 0; corner < 8; ++corner) {
@@ -192,7 +181,7 @@ std::optional<PlacedVolume> placeVolume(const Space& space, const MetavoxelDraw&
   for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
     if (!frame.grids_[slot].present) continue;
     ResidentGrid grid = frame.grids_[slot];
-    compose(volume.objectToWorld, frame.grids_[slot].frame.indexToWorld, grid.frame.indexToWorld);
+    format::compose(volume.objectToWorld, frame.grids_[slot].frame.indexToWorld, grid.frame.indexToWorld);
     if (!format::invertible(grid.frame.indexToWorld)) return std::nullopt;
     placed.params.grids[slot] = gridParams(grid, space.center, Filter::trilinear);
     addReach(space, grid.frame, low, high);
