@@ -16,13 +16,19 @@ billow=build/quickstart/bin/billow
 mkdir -p "$out"
 echo "== Compiling samples/fire to $out/fire.blw"
 "$billow" compile 'samples/fire/fire_####.vdb' -o "$out/fire.blw"
+echo "== Compiling samples/effects to $out/effects.blw"
+"$billow" compile samples/effects/*.effect.json -o "$out/effects.blw"
 echo "== Validating"
 "$billow" validate "$out/fire.blw" && echo "$out/fire.blw is sound"
+"$billow" validate "$out/effects.blw" && echo "$out/effects.blw is sound"
 "$billow" info "$out/fire.blw"
 echo "== Rendering"
 "$billow" render "$out/fire.blw" --frame 7-12 --size 640x360 -o "$out/fire.png"
 "$billow" render "$out/fire.blw" --frame 12 --size 640x360 -o "$out/fire.exr"
+# Beside its packs, so that it draws them wherever they are.
+sed "s|../../out/||" samples/scenes/campfire.scene.json > "$out/campfire.scene.json"
+"$billow" render "$out/campfire.scene.json" --frame 5 -o "$out/campfire.png"
 
 echo
-echo "Done. The pack is $out/fire.blw; the pictures are:"
-ls "$out"/fire*.png "$out"/fire*.exr
+echo "Done. The packs are $out/fire.blw and $out/effects.blw; the pictures are:"
+ls "$out"/*.png "$out"/*.exr

@@ -1,13 +1,13 @@
 #include "extract_effect.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <vector>
 
 #include "effect/rasterise.h"
 #include "import/vdb_write.h"
 #include "import_options.h"
+#include "pack_lookup.h"
 
 namespace billow::command {
 namespace {
@@ -15,25 +15,15 @@ namespace {
 using compiler::Error;
 using compiler::Fault;
 
-std::uint32_t findEffect(const format::Pack& pack, const std::string& name) {
-  const auto& effects = pack.effects().effects;
-  std::vector<std::string_view> names;
-  for (std::uint32_t i = 0; i < effects.size(); ++i) {
-    names.push_back(pack.string(effects[i].name));
-    if (names.back() == name) return i;
-  }
-  throw Error(Fault::commandLine, fmt::format("--effect {}: no such effect; there is: {}", name,
-                                              names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
-}
-
 }  // namespace
 
 void extractEffect(const format::Pack& pack, const EffectArguments& arguments, const std::string& output) {
   if (!arguments.time || !arguments.voxelSize) {
     throw Error(Fault::commandLine, "--effect needs --time and --voxel-size");
   }
-  const std::uint32_t effect = findEffect(pack, arguments.effect);
-  const auto particles = format::particlesAt(pack.effects(), effect, *arguments.time);
+  const auto effect = findEffect(pack, arguments.effect);
+  if (!effect) throw Error(Fault::commandLine, "--effect: " + effect.error());
+  const auto particles = format::particlesAt(pack.effects(), *effect, *arguments.time);
   const auto grids = compiler::rasterise(pack.effects(), particles, *arguments.voxelSize);
   if (grids.density.leaves.empty()) {
     printWarning(fmt::format("effect '{}' is empty {} s after its begin; {} holds empty grids", arguments.effect,

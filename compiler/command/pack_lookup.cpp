@@ -17,10 +17,20 @@ tl::expected<std::uint32_t, std::string> findVolume(const format::Pack& pack, co
     names.push_back(pack.string(volumes[i].name));
     if (names.back() == name) return i;
   }
-  return tl::unexpected(
-      name.empty()
-          ? fmt::format("the pack has {} volumes; choose one with --volume: {}", names.size(), fmt::join(names, ", "))
-          : fmt::format("--volume {}: no such volume; there is: {}", name, fmt::join(names, ", ")));
+  return tl::unexpected(name.empty() ? fmt::format("the pack has {} volumes; choose one by name: {}", names.size(),
+                                                   fmt::join(names, ", "))
+                                     : fmt::format("no volume \"{}\"; there is: {}", name, fmt::join(names, ", ")));
+}
+
+tl::expected<std::uint32_t, std::string> findEffect(const format::Pack& pack, const std::string& name) {
+  const auto& effects = pack.effects().effects;
+  std::vector<std::string_view> names;
+  for (std::uint32_t i = 0; i < effects.size(); ++i) {
+    names.push_back(pack.string(effects[i].name));
+    if (names.back() == name) return i;
+  }
+  return tl::unexpected(fmt::format("no effect \"{}\"; there is: {}", name,
+                                    names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
 }
 
 std::ptrdiff_t findFrame(const format::Pack& pack, const format::VolumeRecord& volume, std::int32_t number) {

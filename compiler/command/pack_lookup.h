@@ -13,8 +13,11 @@
 namespace billow::command {
 
 // The index of the volume with this name; "" takes the only one. The error is a sentence for the user that lists what
-// there is; it is the command line's fault.
+// there is.
 tl::expected<std::uint32_t, std::string> findVolume(const format::Pack& pack, const std::string& name);
+
+// The same for effects.
+tl::expected<std::uint32_t, std::string> findEffect(const format::Pack& pack, const std::string& name);
 
 // The index of frame `number` in the volume's frames, or -1.
 std::ptrdiff_t findFrame(const format::Pack& pack, const format::VolumeRecord& volume, std::int32_t number);

@@ -45,7 +45,9 @@ Checked<void> applyTexts(const RenderArguments& arguments, RenderRequest& reques
     const format::LookField& bounds = format::kLookFields[field];
     std::optional<Triple> value;
     auto done = triple(text, option, {double{bounds.low}, double{bounds.high}}, value);
-    if (value) format::setLook(request.look.record, field, *value);
+    if (!value) return done;
+    format::setLook(request.look.record, field, *value);
+    for (VolumeRequest& volume : request.volumes) format::setLook(volume.look.record, field, *value);
     return done;
   };
   if (auto done = lookTriple(arguments.albedo, "--albedo", format::kLookAlbedo); !done) return done;
@@ -59,20 +61,26 @@ void overrideWith(const std::optional<T>& given, std::optional<T>& field) {
   if (given) field = given;
 }
 
+// Also over what single volumes of a scene have.
+void applyLook(const RenderArguments& arguments, RenderRequest& request) {
+  const LookRequest& given = arguments.direct.look;
+  const auto apply = [&](LookRequest& look, bool whole) {
+    for (std::uint32_t field = 0; field < format::kLookFieldCount; ++field) {
+      if (!format::isSet(given.record, field)) continue;
+      format::setLook(look.record, field, format::lookValues(given.record, field));
+    }
+    if (arguments.density) look.density = whole ? *arguments.density : 1;
+    if (arguments.fire) look.fire = whole ? *arguments.fire : 1;
+  };
+  apply(request.look, true);
+  for (VolumeRequest& volume : request.volumes) apply(volume.look, false);
+  overrideWith(given.scatteringOrders, request.look.scatteringOrders);
+}
+
 void applyNumbers(const RenderArguments& arguments, RenderRequest& request) {
   const RenderRequest& given = arguments.direct;
-  overrideWith(given.volume, request.volume);
-  overrideWith(given.grids.extinction, request.grids.extinction);
-  overrideWith(given.grids.temperature, request.grids.temperature);
-  overrideWith(given.grids.flames, request.grids.flames);
   overrideWith(given.sunIntensity, request.sunIntensity);
-  for (std::uint32_t field = 0; field < format::kLookFieldCount; ++field) {
-    if (!format::isSet(given.look.record, field)) continue;
-    format::setLook(request.look.record, field, format::lookValues(given.look.record, field));
-  }
-  overrideWith(given.look.scatteringOrders, request.look.scatteringOrders);
-  request.look.density = arguments.density.value_or(request.look.density);
-  request.look.fire = arguments.fire.value_or(request.look.fire);
+  overrideWith(given.voxelSize, request.voxelSize);
   request.exposure = arguments.exposure.value_or(request.exposure);
   request.camera.fieldOfView = arguments.fieldOfView.value_or(request.camera.fieldOfView);
   request.output = arguments.output;
@@ -167,8 +175,8 @@ void addLightOptions(CLI::App& command, RenderArguments& arguments) {
 }
 
 void addSourceOptions(CLI::App& command, RenderArguments& arguments) {
-  GridNames& grids = arguments.direct.grids;
-  command.add_option("--volume", arguments.direct.volume, "The volume, where the pack has several");
+  GridNames& grids = arguments.grids;
+  command.add_option("--volume", arguments.volume, "The volume, where the pack has several");
   command.add_option("--extinction", grids.extinction, "Grid to take as smoke, or none (default: by the pack's roles)");
   command.add_option("--temperature", grids.temperature, "Grid to take as temperature, or none");
   command.add_option("--flames", grids.flames, "Grid to take as flames, or none");
@@ -180,11 +188,11 @@ void addSourceOptions(CLI::App& command, RenderArguments& arguments) {
 void addMethodOptions(CLI::App& command, RenderArguments& arguments) {
   command
       .add_option("--method", arguments.method,
-                  "direct marches the volume's tree; metavoxel fills a light-aligned space, which effects need\n"
-                  "(default direct, with --effect metavoxel)")
+                  "direct marches one volume's tree; metavoxel fills a light-aligned space, which effects need, and\n"
+                  "scenes that list what they hold (default: direct where it can)")
       ->check(CLI::IsMember({"direct", "metavoxel"}));
-  command.add_option("--effect", arguments.direct.effects, "An effect of the pack, beside the volume or alone");
-  command.add_option("--time", arguments.direct.time, "Without --frame: seconds after the effects' begin")
+  command.add_option("--effect", arguments.effects, "An effect of the pack, beside the volume or alone");
+  command.add_option("--time", arguments.direct.time, "Without --frame: seconds after the begin of effects or scene")
       ->check(finite())
       ->check(CLI::Range(0.0, format::kMaxEffectTime));
   command
@@ -194,24 +202,63 @@ void addMethodOptions(CLI::App& command, RenderArguments& arguments) {
       ->check(CLI::Range(1e-9, 1e9));
 }
 
-// What is to be drawn, and how.
-Checked<void> applyMethod(const RenderArguments& arguments, RenderRequest& request) {
-  request.effects = arguments.direct.effects;
+// What the options say of a pack's volume, grids and effects. A scene that lists volumes and effects says it all.
+Checked<void> applySources(const RenderArguments& arguments, RenderRequest& request) {
+  const GridNames& grids = arguments.grids;
+  const bool named = arguments.volume || grids.extinction || grids.temperature || grids.flames;
+  if (request.scene) {
+    if (!named && arguments.effects.empty()) return {};
+    return refuse(kCommandLine,
+                  fmt::format("{}: the scene lists what it holds; --volume, --extinction, --temperature, --flames and "
+                              "--effect are for packs",
+                              arguments.input));
+  }
+  VolumeRequest& volume = request.volumes.front();
+  overrideWith(arguments.volume, volume.volume);
+  overrideWith(grids.extinction, volume.grids.extinction);
+  overrideWith(grids.temperature, volume.grids.temperature);
+  overrideWith(grids.flames, volume.grids.flames);
+  if (named) volume.place.clear();
+  for (const std::string& name : arguments.effects) {
+    EffectRequest effect;
+    effect.pack = volume.pack;
+    effect.name = name;
+    request.effects.push_back(std::move(effect));
+  }
+  return {};
+}
+
+Checked<void> applyTime(const RenderArguments& arguments, RenderRequest& request) {
   request.time = arguments.direct.time;
-  request.voxelSize = arguments.direct.voxelSize;
-  request.frames = arguments.frames.has_value();
-  if (!request.frames && request.effects.empty()) {
+  const bool frames = arguments.frames.has_value();
+  if (request.scene) {
+    if (frames != request.time.has_value()) return {};
+    return refuse(kCommandLine, "--frame or --time of a scene: expected one of the two");
+  }
+  if (!frames && request.effects.empty()) {
     return refuse(kCommandLine, "--frame of a volume, or --effect, must be given");
   }
-  if (request.frames == request.time.has_value()) {
+  if (frames == request.time.has_value()) {
     return refuse(kCommandLine, "--time says when effects are drawn without --frame: expected one of the two");
   }
-  const bool effects = !request.effects.empty();
-  if (arguments.method == "direct" && effects) {
-    return refuse(kCommandLine, "--method is \"direct\"; effects are drawn by \"metavoxel\" alone");
-  }
-  request.method = effects || arguments.method == "metavoxel" ? Method::metavoxel : Method::direct;
+  if (!frames) request.volumes.clear();
   return {};
+}
+
+Checked<void> applyMethod(const RenderArguments& arguments, RenderRequest& request) {
+  const bool needed = request.scene || !request.effects.empty();
+  request.method = arguments.method ? (*arguments.method == "direct" ? Method::direct : Method::metavoxel)
+                   : needed         ? Method::metavoxel
+                                    : Method::direct;
+  if (request.method == Method::metavoxel) return {};
+  if (request.effects.empty() && request.volumes.size() == 1 && request.volumes[0].transform == kIdentity) return {};
+  const bool one = request.effects.empty() && request.volumes.size() == 1;
+  const std::string held =
+      one ? "this one has a transform"
+          : fmt::format("here are {} of them and {} effects", request.volumes.size(), request.effects.size());
+  return refuse(
+      kCommandLine,
+      fmt::format("--method is \"direct\", which draws one volume where it lies; {}: expected \"metavoxel\"", held));
 }
 
 }  // namespace
@@ -226,11 +273,15 @@ Checked<RenderRequest> makeRequest(const RenderArguments& arguments) {
   if (std::filesystem::path(arguments.input).extension() == ".json") {
     if (auto done = readScene(arguments.input, request); !done) return tl::unexpected(done.error());
   } else {
-    request.pack = arguments.input;
+    request.volumes.emplace_back();
+    request.volumes.front().pack = arguments.input;
   }
   applyNumbers(arguments, request);
+  applyLook(arguments, request);
   if (auto done = applyTexts(arguments, request); !done) return tl::unexpected(done.error());
-  if (auto done = applyMethod(arguments, request); !done) return tl::unexpected(done.error());
+  for (const auto apply : {applySources, applyTime, applyMethod}) {
+    if (auto done = apply(arguments, request); !done) return tl::unexpected(done.error());
+  }
   return request;
 }
 

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "render_request.h"
 
@@ -16,6 +17,9 @@ struct RenderArguments {
   std::optional<std::string> frames, method, size, camera, sunDirection, sunColor, background, up, filter, albedo,
       ambient;
   std::string shadows = "nearest";
+  std::optional<std::string> volume;
+  GridNames grids;
+  std::vector<std::string> effects;
   RenderRequest direct;  // what CLI11 checks by itself
   std::optional<float> fieldOfView, exposure, density, fire;
 };

@@ -46,14 +46,43 @@ struct GridNames {
 
 enum class Method { direct, metavoxel };
 
-struct RenderRequest {
+using Matrix = std::array<double, 12>;  // 3x4, row-major
+inline constexpr Matrix kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+
+// What a volume shows after its last frame: that frame, all of them again, or nothing.
+enum class AfterLast { hold, loop, vanish };
+
+struct VolumeRequest {
   std::string pack;
   std::optional<std::string> volume;  // needed where the pack has several
+  GridNames grids;
+  LookRequest look;  // over the request's
+  Matrix transform = kIdentity;
+  double begin = 0;                       // when its first frame shows, seconds
+  std::optional<double> framesPerSecond;  // default: the pack's
+  AfterLast after = AfterLast::hold;
+  std::optional<std::int32_t> frame;  // the only one to show, at all times
+  std::string place;                  // "SCENE.json: volumes[0]"; "" where the command line asks for it
+};
+
+struct EffectRequest {
+  std::string pack, name;
+  Matrix transform = kIdentity;  // a format::similarityOf()
+  double begin = 0;              // seconds
+  float density = 1, fire = 1;   // factors on extinction and emission
+  std::string place;             // as a volume's
+};
+
+struct RenderRequest {
+  std::vector<VolumeRequest> volumes;  // drawn by the direct method: one
+  std::vector<EffectRequest> effects;  // drawn by metavoxels, beside volumes or alone
+  // Whether a scene lists all of these; its frame N is N / framesPerSecond seconds after its begin. Else there is a
+  // volume of a pack, whose frames are numbered as its source does, or effects alone.
+  bool scene = false;
+  double framesPerSecond = 24;
   Method method = Method::direct;
-  std::vector<std::string> effects;  // drawn by metavoxels, beside the volume or alone
-  std::optional<double> time;        // of the effects where no frame is asked for, seconds
-  std::optional<double> voxelSize;   // of metavoxels, world units
-  bool frames = false;               // whether frames of a volume are asked for
+  std::optional<double> time;       // where no frame is asked for, seconds
+  std::optional<double> voxelSize;  // of metavoxels, world units
   std::int32_t firstFrame = 0, lastFrame = 0;
   bool range = false;
   std::string output;
@@ -65,7 +94,6 @@ struct RenderRequest {
   std::optional<float> sunIntensity;
   LookRequest look;
   BackgroundRequest background;
-  GridNames grids;
   float exposure = 0;  // stops
   runtime::Filter filter = runtime::Filter::trilinear;
   float step = 1;  // voxels
@@ -74,7 +102,7 @@ struct RenderRequest {
   std::optional<std::uint32_t> device;
 };
 
-// Reads and checks a scene file (spec/scene.schema.json) into `request`; a relative pack path is relative to the scene.
+// Reads and checks a scene file (spec/scene.schema.json) into `request`; relative pack paths are relative to the scene.
 Checked<void> readScene(const std::string& path, RenderRequest& request);
 
 // The texts of options; each gives a sentence with what was expected where it cannot be read.
@@ -89,6 +117,7 @@ Checked<Triple> parseTriple(const std::string& text, const char* option, const B
 
 inline constexpr double kLargest = 1e9;  // of colours, intensities, factors and components of a direction
 inline constexpr std::uint32_t kLargestPicture = 16384;  // pixels an edge
+inline constexpr std::int64_t kMostFrames = 100000;      // of one call
 
 }  // namespace billow::command
 

@@ -1,9 +1,10 @@
+#include "render_scene.h"
+
 #include <filesystem>
 
 #include "command.h"
 #include "json/document.h"
 #include "json/look.h"
-#include "render_request.h"
 
 namespace billow::command {
 namespace {
@@ -13,11 +14,6 @@ using json::Value;
 
 constexpr Range kAnywhere{-kLargest, kLargest};
 constexpr Range kPositive{0, kLargest};
-
-// A member's value into the field, where there is one.
-void readNumber(const Value& object, const char* key, const Range& range, float& field) {
-  if (const auto member = object.find(key)) field = member->single(range);
-}
 
 void readText(const Value& object, const char* key, const char* expected, std::optional<std::string>& field) {
   if (const auto member = object.find(key)) field = member->text(expected);
@@ -40,15 +36,6 @@ void readSun(const Value& value, RenderRequest& request) {
   if (const auto color = value.find("color")) request.sunColor = color->singles<3>(kPositive);
   if (const auto intensity = value.find("intensity")) request.sunIntensity = intensity->single(kPositive);
   if (request.sunDirection == Triple{0, 0, 0}) value.fail("a direction that is not zero");
-}
-
-void readLook(const Value& value, LookRequest& look) {
-  look.record = json::readLook(value, {"density", "fire", "scatteringOrders"});
-  readNumber(value, "density", kPositive, look.density);
-  readNumber(value, "fire", kPositive, look.fire);
-  if (const auto orders = value.find("scatteringOrders")) {
-    look.scatteringOrders = static_cast<std::uint32_t>(orders->integer(1, 8));
-  }
 }
 
 BackgroundRequest readBackground(const Value& value) {
@@ -77,12 +64,29 @@ void readGrids(const Value& value, GridNames& grids) {
   readText(value, "flames", "a grid's name", grids.flames);
 }
 
+// One volume of a pack, or lists of volumes and effects.
+void readContents(const Value& scene, const std::filesystem::path& folder, RenderRequest& request) {
+  const auto volumes = scene.find("volumes"), effects = scene.find("effects");
+  request.scene = volumes || effects;
+  if (!request.scene) {
+    request.volumes.emplace_back();
+    request.volumes.front().place = scene.place();
+    if (const auto rate = scene.find("framesPerSecond")) rate->fail("none beside \"pack\", whose frames have numbers");
+    return readSource(scene, folder, request.volumes.front());
+  }
+  for (const char* single : {"pack", "volume", "grids"}) {
+    if (const auto given = scene.find(single)) given->fail("none beside \"volumes\" or \"effects\", which name packs");
+  }
+  if (volumes) readVolumes(*volumes, folder, request);
+  if (effects) readEffects(*effects, folder, request);
+  if (const auto rate = scene.find("framesPerSecond")) request.framesPerSecond = rate->number({0.001, 1000});
+}
+
 void readDocument(const Value& scene, const std::filesystem::path& folder, RenderRequest& request) {
-  scene.requireKeys(
-      {"$schema", "pack", "volume", "grids", "camera", "sun", "look", "background", "size", "exposure", "filter"});
-  request.pack = (folder / scene.at("pack").text("the path of a pack")).string();
-  readText(scene, "volume", "a volume's name", request.volume);
-  if (const auto grids = scene.find("grids")) readGrids(*grids, request.grids);
+  scene.requireKeys({"$schema", "pack", "volume", "grids", "volumes", "effects", "framesPerSecond", "voxelSize",
+                     "camera", "sun", "look", "background", "size", "exposure", "filter"});
+  readContents(scene, folder, request);
+  if (const auto edge = scene.find("voxelSize")) request.voxelSize = edge->number({1e-9, 1e9});
   if (const auto camera = scene.find("camera")) readCamera(*camera, request);
   if (const auto sun = scene.find("sun")) readSun(*sun, request);
   if (const auto look = scene.find("look")) readLook(*look, request.look);
@@ -96,6 +100,25 @@ void readDocument(const Value& scene, const std::filesystem::path& folder, Rende
 }
 
 }  // namespace
+
+void readNumber(const Value& object, const char* key, const Range& range, float& field) {
+  if (const auto member = object.find(key)) field = member->single(range);
+}
+
+void readSource(const Value& value, const std::filesystem::path& folder, VolumeRequest& volume) {
+  volume.pack = (folder / value.at("pack").text("the path of a pack")).string();
+  readText(value, "volume", "a volume's name", volume.volume);
+  if (const auto grids = value.find("grids")) readGrids(*grids, volume.grids);
+}
+
+void readLook(const Value& value, LookRequest& look) {
+  look.record = json::readLook(value, {"density", "fire", "scatteringOrders"});
+  readNumber(value, "density", kPositive, look.density);
+  readNumber(value, "fire", kPositive, look.fire);
+  if (const auto orders = value.find("scatteringOrders")) {
+    look.scatteringOrders = static_cast<std::uint32_t>(orders->integer(1, 8));
+  }
+}
 
 Checked<void> readScene(const std::string& path, RenderRequest& request) {
   try {

@@ -88,21 +88,30 @@ runtime::Background chooseBackground(const RenderRequest& request, bool burning,
 }
 
 // A scale times a factor, finite.
-float scaled(float scale, float factor) {
-  return static_cast<float>(std::min(double{scale} * double{factor}, double{format::kLargestLook}));
+float scaled(float scale, double factor) {
+  return static_cast<float>(std::min(double{scale} * factor, double{format::kLargestLook}));
 }
 
 // `ambientGiven`: by the pack.
 runtime::Look chooseLook(const LookRequest& wanted, runtime::Look look, bool burning, bool ambientGiven) {
   if (!ambientGiven) look.ambient = burning ? Triple{0.05f, 0.06f, 0.08f} : Triple{0.07f, 0.10f, 0.14f};
   runtime::applyLook(wanted.record, look);
-  look.extinctionScale = scaled(look.extinctionScale, wanted.density);
-  look.emissionScale = scaled(look.emissionScale, wanted.fire);
+  look.extinctionScale = scaled(look.extinctionScale, double{wanted.density});
+  look.emissionScale = scaled(look.emissionScale, double{wanted.fire});
   look.scatteringOrders = wanted.scatteringOrders.value_or(look.scatteringOrders);
   return look;
 }
 
 }  // namespace
+
+runtime::Look lookOf(const RenderRequest& request, const VolumeRequest& volume, const runtime::Look& suggested,
+                     double scale) {
+  runtime::Look look = chooseLook(request.look, suggested, false, true);
+  runtime::applyLook(volume.look.record, look);
+  look.extinctionScale = scaled(look.extinctionScale, double{volume.look.density} / scale);
+  look.emissionScale = scaled(look.emissionScale, double{volume.look.fire} / scale);
+  return look;
+}
 
 char risingAxis(const format::Pack& pack, const format::VolumeRecord& volume, const runtime::GridChoice& grids) {
   runtime::WorldBox first, last;

@@ -20,8 +20,14 @@ struct Stage {
   bool ambientGiven;  // by the pack
 };
 
-// Everything of a DrawInfo but the frame. `opaque` asks for a background that fills the picture.
+// Everything of a DrawInfo but the frame. `opaque` asks for a background that fills the picture. Its look is the
+// suggested one with what the request says, and how everything in the picture scatters.
 runtime::DrawInfo setUp(const RenderRequest& request, const Stage& stage, const runtime::Look& suggested, bool opaque);
+
+// How one of the request's volumes looks. `scale` is how much longer its lengths are in the scene: it keeps its look
+// when it grows.
+runtime::Look lookOf(const RenderRequest& request, const VolumeRequest& volume, const runtime::Look& suggested,
+                     double scale);
 
 // A volume's; [first, last] are frame indices.
 Stage stageOf(const format::Pack& pack, const format::VolumeRecord& volume, const runtime::GridChoice& grids,

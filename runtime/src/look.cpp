@@ -118,18 +118,20 @@ Result<void> fitExtinction(const format::Pack& pack, const format::VolumeRecord&
 }  // namespace
 
 WorldBox worldBox(const format::Pack& pack, const format::VolumeRecord& volume, const GridChoice& grids,
-                  std::uint32_t first, std::uint32_t last) {
+                  std::uint32_t first, std::uint32_t last, const std::array<double, 12>& objectToWorld) {
   WorldBox box;
   for (std::uint32_t frame = first; frame <= last && frame < volume.frameCount; ++frame) {
     for (const std::uint32_t grid : {grids.extinction, grids.temperature, grids.flames}) {
       if (grid == format::kNone) continue;
       const format::GridFrame& g = pack.gridFrame(volume, frame, grid);
       if ((g.flags & format::kGridPresent) == 0 || g.activeMin[0] > g.activeMax[0]) continue;
+      double indexToWorld[12];
+      format::compose(objectToWorld, g.indexToWorld, indexToWorld);
       for (int corner = 0; corner < 8; ++corner) {
         double at[3];
         for (int i = 0; i < 3; ++i) at[i] = (corner >> i & 1) != 0 ? g.activeMax[i] + 0.5 : g.activeMin[i] - 0.5;
         for (std::size_t i = 0; i < 3; ++i) {
-          const double* m = g.indexToWorld + i * 4;
+          const double* m = indexToWorld + i * 4;
           const double world = m[0] * at[0] + m[1] * at[1] + m[2] * at[2] + m[3];
           box.min[i] = box.empty ? world : std::min(box.min[i], world);
           box.max[i] = box.empty ? world : std::max(box.max[i], world);

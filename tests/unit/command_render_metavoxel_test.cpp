@@ -87,7 +87,7 @@ TEST_F(RenderMetavoxel, RefusesWhatItCannotDo) {
   expectRefused("--effect balls", "--time");
   expectRefused("--frame 7 --effect balls --time 1", "--time");
   expectRefused("--frame 7 --effect balls --method direct", "direct");
-  expectRefused("--effect steam --time 1", "it has balls");
+  expectRefused("--effect steam --time 1", "there is: balls");
   expectRefused("--effect balls --time -1", "--time");
   expectRefused("--effect balls --time nan", "not a finite number");
   expectRefused("--frame 7 --method metavoxel --voxel-size 0", "--voxel-size");

@@ -223,7 +223,7 @@ TEST(JsonLook, IsBoundedAsTheSchemasSay) {
   for (const format::LookField& field : format::kLookFields) {
     const std::string name(field.name);
     for (const auto& [schema, look] : {std::pair{manifest, manifest["definitions"]["look"]["properties"]},
-                                       std::pair{scene, scene["properties"]["look"]["properties"]}}) {
+                                       std::pair{scene, scene["$defs"]["look"]["properties"]}}) {
       const auto bounds = boundsIn(schema, look.at(name));
       EXPECT_EQ(bounds.at(field.open ? "exclusiveMinimum" : "minimum").get<double>(), double{field.low}) << name;
       EXPECT_EQ(bounds.at(field.open ? "exclusiveMaximum" : "maximum").get<double>(), double{field.high}) << name;

@@ -15,9 +15,11 @@ struct WorldBox {
   bool empty = true;
 };
 
-// The world box of what is active in frames [first, last] (indices into the volume's frames) of the chosen grids.
+// The world box of what is active in frames [first, last] (indices into the volume's frames) of the chosen grids, in
+// the scene's world where there is one (MetavoxelVolume::objectToWorld).
 WorldBox worldBox(const format::Pack& pack, const format::VolumeRecord& volume, const GridChoice& grids,
-                  std::uint32_t first, std::uint32_t last);
+                  std::uint32_t first, std::uint32_t last,
+                  const std::array<double, 12>& objectToWorld = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0});
 
 // Replaces what the record sets.
 void applyLook(const format::LookRecord& record, Look& look);
