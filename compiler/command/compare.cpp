@@ -9,6 +9,7 @@
 
 #include "billow/format/temp_file.h"
 #include "command.h"
+#include "compare_effects.h"
 #include "compare_frames.h"
 #include "import_options.h"
 #include "pack_lookup.h"
@@ -62,12 +63,15 @@ void printTable(const std::vector<GridRow>& rows) {
   }
 }
 
-void printJson(const std::string& pack, const std::vector<GridRow>& rows, bool allSound) {
+void printJson(const std::string& pack, const std::vector<GridRow>& rows, const std::vector<EffectRow>& effects,
+               bool allSound) {
   nlohmann::ordered_json json;
   json["pack"] = pack;
   json["sound"] = allSound;
   json["grids"] = nlohmann::ordered_json::array();
   for (const GridRow& row : rows) json["grids"].push_back(toJson(row));
+  json["effects"] = nlohmann::ordered_json::array();
+  for (const EffectRow& row : effects) json["effects"].push_back(toJson(row));
   fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 
@@ -98,10 +102,6 @@ int runCompare(const Arguments& arguments) {
   if (!pack) return reportIssue(arguments.pack, pack.error());
   const compiler::ImportOptions options = importOptions(arguments.import);
   const compiler::Plan plan = compiler::planInputs(arguments.inputs, options, printWarning);
-  if (!plan.effects.empty()) {
-    throw compiler::Error(compiler::Fault::commandLine,
-                          plan.effects.front().file + ": compare measures volumes; it cannot measure effects");
-  }
   std::optional<format::TempFile> file;  // opened before the work, so that a bad path costs no time
   std::optional<ReportCollector> report;
   if (!arguments.report.empty()) {
@@ -113,12 +113,20 @@ int runCompare(const Arguments& arguments) {
     if (report) report->observe(compared);
   });
   if (!rows) return reportIssue(arguments.pack, rows.error());
-  if (report) writeReport(report->finish(*rows, plan, options), *file);
-  const bool allSound = std::all_of(rows->begin(), rows->end(), [](const GridRow& row) { return row.sound(); });
+  const std::vector<EffectRow> effects = compareEffects(*pack, plan);
+  if (report) {
+    ReportData data = report->finish(*rows, plan, options);
+    data.effects = effects;
+    writeReport(data, *file);
+  }
+  const auto sound = [](const auto& row) { return row.sound(); };
+  const bool allSound = std::ranges::all_of(*rows, sound) && std::ranges::all_of(effects, sound);
   if (arguments.json) {
-    printJson(arguments.pack, *rows, allSound);
+    printJson(arguments.pack, *rows, effects, allSound);
   } else {
-    printTable(*rows);
+    if (!rows->empty()) printTable(*rows);
+    if (!rows->empty() && !effects.empty()) fmt::print("\n");
+    if (!effects.empty()) printTable(effects);
   }
   if (allSound) return kDone;
   fmt::print(stderr, "billow: error: {}: does not hold what the source holds\n", arguments.pack);
@@ -129,7 +137,8 @@ int runCompare(const Arguments& arguments) {
 
 void addCompare(CLI::App& app, Run& run) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("compare", "Measure a pack's error against its source, per grid and frame");
+  CLI::App* command =
+      app.add_subcommand("compare", "Measure a pack's error against its source: per grid and frame, per effect");
   command->add_option("PACK", arguments->pack, "The pack to measure")->required()->type_name("PACK");
   command->add_option("INPUT", arguments->inputs, "The source, as for compile")->required()->type_name("INPUT");
   addImportOptions(*command, arguments->import);
@@ -139,10 +148,15 @@ void addCompare(CLI::App& app, Run& run) {
   command->footer(
       "PSNR is 20 log10((max - min) / RMSE) over active voxels; max and min are the source's, background included.\n"
       "Depth is the same over line integrals (optical depth) along nine directions: what pictures are made of.\n"
-      "Exit code 3 when a frame or a grid of the source is not in the pack, or a voxel is active in one of them only.\n"
+      "Of effects, each curve, ramp, displacement map and track is held against its description, in its own unit; the\n"
+      "numbers must be the same.\n"
+      "Exit code 3 when a frame, a grid or an effect of the source is not in the pack, a voxel is active in one of "
+      "them\n"
+      "only, or an effect's numbers differ.\n"
       "The report is one HTML file that needs no network. For each grid it measures every encoding on its worst "
       "frame.\n"
-      "Example: billow compare fire.blw 'fire_####.vdb' --report fire.html");
+      "Examples: billow compare fire.blw 'fire_####.vdb' --report fire.html\n"
+      "          billow compare smoke.blw campfire_smoke.effect.json");
   command->callback([arguments, &run] { run = [arguments] { return runCompare(*arguments); }; });
 }
 

@@ -90,7 +90,8 @@ std::string problemText(const GridRow& row) {
 }
 
 std::string problems(const ReportData& data) {
-  if (data.problems.empty()) return "";
+  const auto bad = std::ranges::count_if(data.effects, [](const EffectRow& row) { return !row.sound(); });
+  if (data.problems.empty() && bad == 0) return "";
   std::string html = R"(<section class="bad" role="alert"><h2>The pack does not hold what the source holds</h2><ul>)";
   for (std::size_t i = 0; i < std::min(data.problems.size(), kProblemsShown); ++i) {
     html += "<li>" + problemText(data.problems[i]) + "</li>";
@@ -98,6 +99,7 @@ std::string problems(const ReportData& data) {
   if (data.problems.size() > kProblemsShown) {
     html += fmt::format("<li>and {} more</li>", data.problems.size() - kProblemsShown);
   }
+  if (bad > 0) html += fmt::format("<li>{} parts of effects: see below</li>", bad);
   return html + "</ul></section>\n";
 }
 
@@ -153,7 +155,7 @@ std::string renderPage(const ReportData& data) {
   html += fmt::format(R"(<p class="note">Source: {}</p>)", inputsText(data));
   html += summary(data) + "</header>\n<main>\n" + problems(data);
   for (std::size_t g = 0; g < data.grids.size(); ++g) html += gridSection(data.grids[g], g, data.effort);
-  html += bytesSection(data) + tableSection(data) + "</main>\n<script>";
+  html += bytesSection(data) + tableSection(data) + effectsSection(data) + "</main>\n<script>";
   html += pageScript();
   return html + "</script>\n</body>\n</html>\n";
 }

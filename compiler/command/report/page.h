@@ -22,6 +22,7 @@ std::string gridSection(const ReportGrid& grid, std::size_t number, int effort);
 // GPU bytes by kind and frame, disk bytes, and the table of every grid and frame.
 std::string bytesSection(const ReportData& data);
 std::string tableSection(const ReportData& data);
+std::string effectsSection(const ReportData& data);  // "" without effects
 
 }  // namespace billow::command
 

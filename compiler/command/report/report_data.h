@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "billow/format/brick.h"
+#include "compare_effects.h"
 #include "compare_frames.h"
 
 namespace billow::command {
@@ -79,6 +80,7 @@ struct ReportData {
   std::vector<ReportGrid> grids;
   std::vector<FrameDisk> disk;
   std::vector<GridRow> problems;  // rows that are not sound()
+  std::vector<EffectRow> effects;
 };
 
 }  // namespace billow::command

@@ -37,21 +37,18 @@ class Baker {
 
  private:
   void addEmitter(const EmitterDescription& emitter, float duration) {
-    format::EmitterRecord record = emitter.record;
+    format::EmitterRecord record = numbersOf(emitter);
     record.name = tables_.addString(emitter.name);
     record.firstSpan = static_cast<std::uint32_t>(effects_.spans.size());
     record.spanCount = static_cast<std::uint32_t>(emitter.spans.size());
     effects_.spans.insert(effects_.spans.end(), emitter.spans.begin(), emitter.spans.end());
-    record.positionRow = format::kNoRow;
-    if (emitter.position.times.size() == 1) {
-      for (std::size_t i = 0; i < 3; ++i) record.position[i] = static_cast<float>(emitter.position.values[0][i]);
-    } else if (!emitter.position.empty()) {
-      record.positionRow = rows(emitter.position, 3, static_cast<double>(duration));
-    }
+    const bool moves = emitter.position.times.size() > 1;
+    record.positionRow = moves ? rows(emitter.position, 3, static_cast<double>(duration)) : format::kNoRow;
     record.radiusRow = rows(emitter.radius, 1, 1);
     record.opacityRow = rows(emitter.opacity, 1, 1);
     record.diffuseRow = rows(emitter.diffuse, 3, 1);
-    record.emissionRow = rows(emitter.emission, 3, 1);
+    const auto emission = [&](double time) { return emitter.emission->at(time); };
+    record.emissionRow = emitter.emission ? rowsOf(emission, 3, 1) : format::kNoRow;
     record.rotationRow = rows(emitter.rotation, 1, 1);
     record.displacementRow = rows(emitter.displacement, 1, 1);
     record.firstMap = emitter.map ? maps(*emitter.map) : format::kNoMap;
@@ -67,10 +64,14 @@ class Baker {
 
   // The first of `count` consecutive rows, one a component, over [0, end].
   std::uint32_t rows(const Keys& keys, std::size_t count, double end) {
-    if (keys.empty()) return format::kNoRow;
+    return keys.empty() ? format::kNoRow : rowsOf([&](double time) { return keys.at(time); }, count, end);
+  }
+
+  template <class Curve>
+  std::uint32_t rowsOf(const Curve& curve, std::size_t count, double end) {
     std::vector<format::CurveRow> wanted(count);
     for (std::uint32_t i = 0; i < format::kCurveSamples; ++i) {
-      const auto value = keys.at(end * i / (format::kCurveSamples - 1));
+      const std::array<double, 3> value = curve(end * i / (format::kCurveSamples - 1));
       for (std::size_t c = 0; c < count; ++c) wanted[c].values[i] = static_cast<float>(value[c]);
     }
     return shared(effects_.curves, wanted);
@@ -87,15 +88,6 @@ class Baker {
       }
     }
     return shared(effects_.ramps, std::vector{table});
-  }
-
-  static std::array<double, 3> rampColour(const std::vector<RampRow>& ramp, double radius, double age) {
-    Keys ages;
-    for (const RampRow& row : ramp) {
-      ages.times.push_back(row.age);
-      ages.values.push_back(row.colour.at(radius));
-    }
-    return ages.at(age);
   }
 
   std::uint32_t maps(const NoiseMap& map) {
@@ -135,6 +127,23 @@ class Baker {
 };
 
 }  // namespace
+
+format::EmitterRecord numbersOf(const EmitterDescription& emitter) {
+  format::EmitterRecord record = emitter.record;
+  if (emitter.position.times.size() == 1) {
+    for (std::size_t i = 0; i < 3; ++i) record.position[i] = static_cast<float>(emitter.position.values[0][i]);
+  }
+  return record;
+}
+
+std::array<double, 3> rampColour(std::span<const RampRow> ramp, double radius, double age) {
+  Keys ages;
+  for (const RampRow& row : ramp) {
+    ages.times.push_back(row.age);
+    ages.values.push_back(row.colour.at(radius));
+  }
+  return ages.at(age);
+}
 
 void bakeEffects(std::span<const EffectDescription> effects, format::PackTables& tables) {
   Baker baker(tables);

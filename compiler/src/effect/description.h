@@ -39,6 +39,16 @@ struct NoiseMap {
   bool operator==(const NoiseMap&) const = default;
 };
 
+// What shines: products of curves, which are no curves of straight lines.
+struct Emission {
+  Keys colour, strength, temperature;  // the last empty: no black body
+
+  bool constant() const {
+    return colour.times.size() <= 1 && strength.times.size() <= 1 && temperature.times.size() <= 1;
+  }
+  std::array<double, 3> at(double time) const;
+};
+
 // A wind in whirls, which drag passes on.
 struct CurlNoise {
   double speed;      // world units a second, typical
@@ -57,7 +67,8 @@ struct EmitterDescription {
   format::EmitterRecord record{};  // its numbers; what refers to tables comes with the tables
   std::vector<format::SpawnSpan> spans;
   // Over the effect's time (position) or a particle's life; empty: none.
-  Keys position, radius, opacity, diffuse, emission, rotation, displacement;
+  Keys position, radius, opacity, diffuse, rotation, displacement;
+  std::optional<Emission> emission;     // where it is not constant
   format::ParticleMaterial material{};  // likewise
   Keys profile;
   std::vector<RampRow> diffuseRamp, emissionRamp;

@@ -125,25 +125,19 @@ format::CubeMap encode(std::vector<float> level) {
 }
 
 // The values of all maps together are stretched to [0, 1].
-std::vector<format::CubeMap> encodeAll(const std::vector<double>& values) {
+std::vector<MapValues> stretched(const std::vector<double>& values) {
   const auto [least, most] = std::minmax_element(values.begin(), values.end());
   const double low = *least, span = *most > low ? *most - low : 1;
-  std::vector<format::CubeMap> maps(values.size() / kMapTexels);
-  parallelRanges(maps.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t f = begin; f < end; ++f) {
-      std::vector<float> level(kMapTexels);
-      for (std::size_t i = 0; i < kMapTexels; ++i) {
-        level[i] = static_cast<float>((values[f * kMapTexels + i] - low) / span);
-      }
-      maps[f] = encode(std::move(level));
-    }
-  });
+  std::vector<MapValues> maps(values.size() / kMapTexels, MapValues(kMapTexels));
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    maps[i / kMapTexels][i % kMapTexels] = static_cast<float>((values[i] - low) / span);
+  }
   return maps;
 }
 
 }  // namespace
 
-format::CubeMap makePictureMap(const Image& picture) {
+MapValues pictureValues(const Image& picture) {
   std::vector<double> values(kMapTexels);
   for (std::size_t i = 0; i < values.size(); ++i) {
     const Vec3 d = unitDirection(i);
@@ -151,17 +145,30 @@ format::CubeMap makePictureMap(const Image& picture) {
     const double longitude = format::turnsOf(d[0], d[2]), latitude = format::turnsOf(d[1], across);
     values[i] = picture.sample(longitude + 0.5, 0.5 - 2 * latitude, true)[0];
   }
-  return encodeAll(values).front();
+  return stretched(values).front();
 }
 
-std::vector<format::CubeMap> makeNoiseMaps(const NoiseMap& map) {
+std::vector<MapValues> noiseValues(const NoiseMap& map) {
   std::vector<double> values(kMapTexels * map.frames);
   parallelRanges(values.size(), 1024, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       values[i] = animated(map, unitDirection(i % kMapTexels), static_cast<std::uint32_t>(i / kMapTexels));
     }
   });
-  return encodeAll(values);
+  return stretched(values);
+}
+
+format::CubeMap makePictureMap(const Image& picture) {
+  return encode(pictureValues(picture));
+}
+
+std::vector<format::CubeMap> makeNoiseMaps(const NoiseMap& map) {
+  const std::vector<MapValues> values = noiseValues(map);
+  std::vector<format::CubeMap> maps(values.size());
+  parallelRanges(maps.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t f = begin; f < end; ++f) maps[f] = encode(values[f]);
+  });
+  return maps;
 }
 
 }  // namespace billow::compiler

@@ -9,6 +9,12 @@
 
 namespace billow::compiler {
 
+// The values of a map's largest level, face by face, row by row, before any of them is rounded.
+using MapValues = std::vector<float>;
+// Of all maps, which together fill [0, 1]; what the two functions below encode.
+std::vector<MapValues> noiseValues(const NoiseMap& map);
+MapValues pictureValues(const Image& picture);
+
 // `map.frames` maps, whose values together fill [0, 1]. The same bytes for any thread count.
 std::vector<format::CubeMap> makeNoiseMaps(const NoiseMap& map);
 

@@ -76,35 +76,14 @@ void readDiffuse(const Value& value, const std::filesystem::path& folder, Emitte
   if (const auto occlusion = value.find("occlusion")) emitter.material.occlusion = occlusion->single(kShare);
 }
 
-// Colour, strength and heat multiply; all are sampled into one curve, for products of lines are no lines.
-Keys emissionKeys(const Keys& colour, const Keys& strength, const Keys& temperature) {
-  double hottest = 0;
-  for (const auto& key : temperature.values) hottest = std::max(hottest, key[0]);
-  const double brightest = temperature.empty() ? 1 : largest(blackBody(hottest));
-  Keys keys;
-  const bool constant = colour.times.size() <= 1 && strength.times.size() <= 1 && temperature.times.size() <= 1;
-  const int samples = constant ? 1 : static_cast<int>(format::kCurveSamples);
-  for (int i = 0; i < samples; ++i) {
-    const double time = constant ? 0 : static_cast<double>(i) / (format::kCurveSamples - 1);
-    std::array<double, 3> product = colour.at(time);
-    const std::array<double, 3> heat =
-        temperature.empty() ? std::array<double, 3>{1, 1, 1} : blackBody(temperature.at(time)[0]);
-    for (std::size_t c = 0; c < 3; ++c) product[c] *= strength.at(time)[0] * heat[c] / brightest;
-    keys.times.push_back(time);
-    keys.values.push_back(product);
-  }
-  return keys;
-}
-
 void readEmission(const Value& value, const std::filesystem::path& folder, EmitterDescription& emitter) {
   value.requireKeys({"colour", "strength", "temperature", "ramp"});
   constexpr Range kFactor{0, 1000};  // two of them and a ramp stay in range
-  Keys colour{{0}, {{1, 1, 1}}}, temperature;
-  if (const auto given = value.find("colour")) colour = readVectorCurve(*given, kLife, kFactor);
-  if (const auto given = value.find("temperature")) temperature = readCurve(*given, kLife, {500, 20000});
-  const Keys keys = emissionKeys(colour, readCurve(value.at("strength"), kLife, kFactor), temperature);
-  setColour(keys.times.size() == 1 ? keys.values[0] : std::array<double, 3>{1, 1, 1}, emitter.record.emission);
-  if (keys.times.size() > 1) emitter.emission = keys;
+  Emission emission{{{0}, {{1, 1, 1}}}, readCurve(value.at("strength"), kLife, kFactor), {}};
+  if (const auto given = value.find("colour")) emission.colour = readVectorCurve(*given, kLife, kFactor);
+  if (const auto given = value.find("temperature")) emission.temperature = readCurve(*given, kLife, {500, 20000});
+  setColour(emission.constant() ? emission.at(0) : std::array<double, 3>{1, 1, 1}, emitter.record.emission);
+  if (!emission.constant()) emitter.emission = emission;
   if (const auto ramp = value.find("ramp")) emitter.emissionRamp = readRamp(*ramp, kFactor, folder);
 }
 
@@ -201,6 +180,20 @@ void readDensity(const Value& value, EmitterDescription& emitter) {
 }
 
 }  // namespace
+
+std::array<double, 3> Emission::at(double time) const {
+  std::array<double, 3> product = colour.at(time);
+  std::array<double, 3> heat{1, 1, 1};
+  double brightest = 1;
+  if (!temperature.empty()) {
+    double hottest = 0;
+    for (const auto& key : temperature.values) hottest = std::max(hottest, key[0]);
+    brightest = largest(blackBody(hottest));
+    heat = blackBody(temperature.at(time)[0]);
+  }
+  for (std::size_t c = 0; c < 3; ++c) product[c] *= strength.at(time)[0] * heat[c] / brightest;
+  return product;
+}
 
 void readPrimitive(const Value& value, const std::filesystem::path& folder, EmitterDescription& emitter) {
   value.requireKeys({"kind", "proportions", "radius", "radiusOverLife", "density", "diffuse", "emission", "rotation",
