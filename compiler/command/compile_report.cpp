@@ -77,7 +77,8 @@ void printReport(const compiler::CompileReport& report, const std::string& outpu
     fmt::print("\n{}: effect of {} emitter{}, at most {} particles alive\n", effect.name, effect.emitters,
                effect.emitters == 1 ? "" : "s", effect.mostAlive);
   }
-  if (!report.effects.empty()) fmt::print("Effects take {} in all\n", size(report.effectBytes));
+  if (!report.effects.empty())
+    fmt::print("Effects take {} on disk, {} on the GPU\n", size(report.effectBytes), size(report.effectGpuBytes));
 }
 
 nlohmann::ordered_json reportJson(const compiler::CompileReport& report, const std::string& output) {
@@ -89,6 +90,7 @@ nlohmann::ordered_json reportJson(const compiler::CompileReport& report, const s
   json["grids"] = Json::array();
   for (const GridReport& grid : report.grids) json["grids"].push_back(toJson(grid));
   json["effectBytes"] = report.effectBytes;
+  json["effectGpuBytes"] = report.effectGpuBytes;
   json["effects"] = Json::array();
   for (const compiler::EffectReport& effect : report.effects) {
     json["effects"].push_back({{"name", effect.name}, {"emitters", effect.emitters}, {"mostAlive", effect.mostAlive}});

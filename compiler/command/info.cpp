@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "command.h"
 #include "encoding_keys.h"
@@ -81,6 +82,13 @@ Json toJson(const EffectSummary& effect) {
   return json;
 }
 
+// What effects put on the GPU, by kind.
+constexpr std::pair<const char*, std::uint64_t format::EffectGpuBytes::*> kEffectKinds[] = {
+    {"materials", &format::EffectGpuBytes::materials}, {"curves", &format::EffectGpuBytes::curves},
+    {"ramps", &format::EffectGpuBytes::ramps},         {"maps", &format::EffectGpuBytes::maps},
+    {"emitters", &format::EffectGpuBytes::emitters},   {"tracks", &format::EffectGpuBytes::tracks},
+    {"particles", &format::EffectGpuBytes::particles}};
+
 Json toJson(const PackSummary& pack) {
   Json json;
   json["pack"] = pack.path;
@@ -90,6 +98,10 @@ Json toJson(const PackSummary& pack) {
   json["disk"]["pages"] = pack.storedPageBytes;
   json["pages"]["count"] = pack.pageCount;
   json["pages"]["rawBytes"] = pack.rawPageBytes;
+  json["gpu"]["volumes"] = pack.volumeGpuBytes;  // all frames resident
+  for (const auto& [name, bytes] : kEffectKinds) json["gpu"]["effects"][name] = pack.effectGpu.*bytes;
+  json["gpu"]["effects"]["total"] = pack.effectGpu.total();
+  json["gpu"]["total"] = pack.gpuBytes();
   for (std::size_t i = 0; i < pack.pagesByCodec.size(); ++i)
     json["pages"]["codecs"][kCodecNames[i]] = pack.pagesByCodec[i];
   for (std::uint32_t i = 0; i < format::kStreamCount; ++i) json["pages"][kStreamNames[i]] = pack.rawByStream[i];
@@ -180,6 +192,16 @@ void printEffect(const EffectSummary& effect) {
   }
 }
 
+void printEffectBytes(const PackSummary& pack) {
+  std::string kinds;
+  for (const auto& [name, bytes] : kEffectKinds) {
+    const std::uint64_t count = pack.effectGpu.*bytes;
+    if (count > 0) kinds += fmt::format("{}{} {}", kinds.empty() ? "" : ", ", name, size(count));
+  }
+  fmt::print("\nEffects: {} on disk, {} on the GPU ({})\n", size(pack.effectBytes), size(pack.effectGpu.total()),
+             kinds);
+}
+
 void printText(const PackSummary& pack) {
   fmt::print("{}: {} (pages {}, {} when unpacked; tables {})\n", pack.path, size(pack.fileBytes),
              size(pack.storedPageBytes), size(pack.rawPageBytes), size(pack.tableBytes));
@@ -199,7 +221,8 @@ void printText(const PackSummary& pack) {
     printLargestFrame(volume);
   }
   for (const EffectSummary& effect : pack.effects) printEffect(effect);
-  if (!pack.effects.empty()) fmt::print("\nEffects: {} on disk\n", size(pack.effectBytes));
+  if (!pack.effects.empty()) printEffectBytes(pack);
+  fmt::print("\nAll of it on the GPU: {}\n", size(pack.gpuBytes()));
 }
 
 int runInfo(const std::string& path, bool json) {
@@ -225,6 +248,8 @@ void addInfo(CLI::App& app, Run& run) {
   command->add_option("PACK", arguments->pack, "The .blw file")->required();
   command->add_flag("--json", arguments->json, "One JSON object on stdout, and nothing else");
   command->footer(
+      "On the GPU are all frames and effects at once, what they share counted once; of particles, as many as may be "
+      "alive.\n"
       "PSNR is 20 log10(range / rmse) over active voxels, range that of the source's values and background.\n"
       "Exit codes: 0 done, 1 command line, 2 the file cannot be read, 3 it is no sound pack.");
   command->callback([&run, arguments] { run = [arguments] { return runInfo(arguments->pack, arguments->json); }; });

@@ -67,6 +67,17 @@ EffectSummary summariseEffect(const format::Pack& pack, const format::EffectReco
   return summary;
 }
 
+// Items of each stream: the last page's end.
+std::array<std::uint64_t, format::kStreamCount> itemCounts(const format::Pack& pack) {
+  std::array<std::uint64_t, format::kStreamCount> counts{};
+  if (pack.pages().empty()) return counts;
+  for (std::uint32_t s = 0; s < format::kStreamCount; ++s) {
+    const format::StreamRange& range = pack.pages().back().streams[s];
+    counts[s] = std::uint64_t{range.first} + range.count;
+  }
+  return counts;
+}
+
 std::optional<format::Issue> countEncodings(const format::Pack& pack, PackSummary& summary) {
   for (std::uint32_t p = 0; p < pack.pages().size(); ++p) {
     const format::PageRecord& record = pack.pages()[p];
@@ -110,6 +121,8 @@ format::Result<PackSummary> summarise(const std::string& path) {
     summary.effects.push_back(summariseEffect(*pack, effect));
   }
   summary.effectBytes = format::effectBytes(pack->effects());
+  summary.effectGpu = format::effectGpuBytes(pack->effects());
+  summary.volumeGpuBytes = format::packGpuBytes(pack->gridFrames(), itemCounts(*pack));
   return summary;
 }
 

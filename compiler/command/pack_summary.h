@@ -66,6 +66,9 @@ struct PackSummary {
   std::vector<VolumeSummary> volumes;
   std::vector<EffectSummary> effects;
   std::uint64_t effectBytes = 0;  // of all tables of effects; part of tableBytes
+  format::EffectGpuBytes effectGpu;
+  std::uint64_t volumeGpuBytes = 0;  // of all frames and grids, what they share counted once
+  std::uint64_t gpuBytes() const { return volumeGpuBytes + effectGpu.total(); }
 };
 
 // Reads every page, to count encodings.

@@ -18,7 +18,7 @@ namespace billow::compiler {
 // Sizes that the pack keeps to, with the least error that fits; quality.psnr is then not looked at, quality.maxError
 // holds as well.
 struct Budget {
-  // Of all frames and grids together, what they share counted once (format::packGpuBytes).
+  // Of all frames, grids and effects together, what they share counted once (CompileReport::gpuBytes).
   std::optional<std::uint64_t> gpu;
   std::optional<std::uint64_t> disk;  // the file's size
   bool any() const { return gpu || disk; }
@@ -63,10 +63,11 @@ struct EffectReport {
 struct CompileReport {
   std::vector<GridReport> grids;
   std::vector<EffectReport> effects;
-  std::uint64_t effectBytes = 0;  // of all, on disk
+  std::uint64_t effectBytes = 0;     // of all, on disk
+  std::uint64_t effectGpuBytes = 0;  // format::effectGpuBytes
   std::size_t frames = 0;
   std::uint64_t fileBytes = 0;
-  std::uint64_t gpuBytes = 0;  // format::packGpuBytes
+  std::uint64_t gpuBytes = 0;  // format::packGpuBytes, and those of effects
 };
 
 // Writes `output` whole or not at all. The bytes depend on inputs and options alone. Throws Error, std::system_error.

@@ -59,6 +59,23 @@ std::uint64_t packGpuBytes(std::span<const GridFrame> gridFrames,
   return bytes;
 }
 
+std::uint64_t EffectGpuBytes::total() const {
+  return materials + curves + ramps + maps + emitters + tracks + particles;
+}
+
+EffectGpuBytes effectGpuBytes(const EffectTables& tables) {
+  const auto bytesOf = [](const auto& records) { return std::as_bytes(std::span(records)).size(); };
+  EffectGpuBytes bytes;
+  bytes.materials = bytesOf(tables.materials);
+  bytes.curves = bytesOf(tables.curves);
+  bytes.ramps = bytesOf(tables.ramps);
+  bytes.maps = tables.maps.size() * kGpuCubeBytes;
+  bytes.emitters = bytesOf(tables.emitters);
+  for (const TrackFrame& frame : tables.trackFrames) bytes.tracks += std::uint64_t{frame.count} * sizeof(TrackPoint);
+  for (const EffectRecord& effect : tables.effects) bytes.particles += mostAlive(tables, effect) * sizeof(Particle);
+  return bytes;
+}
+
 void countBrick(GridFrame& gridFrame, std::uint32_t encoding) {
   if (encoding == kEncodingConstant) return;
   const auto which = static_cast<std::uint32_t>(brickClass(encoding));

@@ -81,7 +81,7 @@ class Search {
 
   PackBytes estimate(double place) const {
     const PackBytes bytes = survey_.at(ladderMultiplier(place), mix_);
-    return {bytes.gpu * correction_.gpu, bytes.disk * correction_.disk};
+    return {effects_.gpu + bytes.gpu * correction_.gpu, effects_.disk + bytes.disk * correction_.disk};
   }
 
   // Near the finest place whose estimate fits.
@@ -158,7 +158,9 @@ class Search {
     measured_ = {static_cast<double>(report.gpuBytes), static_cast<double>(report.fileBytes)};
     usage_ = usage(measured_);
     const PackBytes expected = survey_.at(multiplier, mix_);
-    correction_ = {measured_.gpu / std::max(expected.gpu, 1.0), measured_.disk / std::max(expected.disk, 1.0)};
+    effects_ = {static_cast<double>(report.effectGpuBytes), static_cast<double>(report.effectBytes)};
+    correction_ = {(measured_.gpu - effects_.gpu) / std::max(expected.gpu, 1.0),
+                   (measured_.disk - effects_.disk) / std::max(expected.disk, 1.0)};
     noteBalance();
     if (usage_ > 1) {
       tooFine_ = std::max(tooFine_, place);
@@ -207,6 +209,7 @@ class Search {
   bool balanced_ = mixes_.size() == 1;
   double aim_ = kFirstAim;
   PackBytes correction_{1, 1};
+  PackBytes effects_{0, 0};         // what they take whatever the volumes do, known after a pass
   double tooFine_ = kFinest - 1;    // the coarsest place that was too large
   double fitting_ = kCoarsest + 1;  // the finest place that fitted
   PackBytes measured_;              // by the last pass

@@ -55,6 +55,7 @@ WritePass::WritePass(const std::string& output, const CompileOptions& options, c
     report_.effects.push_back({plan.effects[i].name, effect.emitterCount, mostAlive(tables_.effects, effect)});
   }
   report_.effectBytes = effectBytes(tables_.effects);
+  report_.effectGpuBytes = effectGpuBytes(tables_.effects).total();
 }
 
 void WritePass::addVolume(const PlannedVolume& volume) {
@@ -95,7 +96,7 @@ void WritePass::run(const GoalFunction& goal, const Warn& warn) {
   runFrames(
       {plan_, options_.import, options_.quality.effort, warn, goal, [this](const FrameWork& frame) { write(frame); }});
   tables_.infoJson = settingsJson(options_);
-  report_.gpuBytes = format::packGpuBytes(tables_.gridFrames, writer_.itemCounts());
+  report_.gpuBytes = format::packGpuBytes(tables_.gridFrames, writer_.itemCounts()) + report_.effectGpuBytes;
   report_.fileBytes = writer_.close(tables_);
 }
 

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <utility>
 
+#include "billow/format/gpu_size.h"
 #include "params.h"
 
 namespace billow::runtime {
@@ -12,6 +13,7 @@ namespace {
 
 constexpr std::uint32_t kFace = gpu::kCubeFaceTexels;
 static_assert(kFace == format::kCubeEdge + 2 && gpu::kCubeLayers == format::kCubeFaces);
+static_assert(format::kGpuCubeBytes == std::uint64_t{kFace} * kFace * gpu::kCubeLayers);
 
 template <class T>
 Result<void> keep(Result<T> made, T& place) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "billow/format/effect.h"
 #include "billow/format/layout.h"
 
 namespace billow::format {
@@ -42,6 +43,18 @@ GpuBytes gpuBytes(const GridFrame& gridFrame);
 // in the pack (the page table's last range ends).
 std::uint64_t packGpuBytes(std::span<const GridFrame> gridFrames,
                            const std::array<std::uint64_t, kStreamCount>& stored);
+
+// A displacement map: a byte a texel of its largest level, each face with a border of one.
+inline constexpr std::uint64_t kGpuCubeBytes = std::uint64_t{kCubeFaces} * (kCubeEdge + 2) * (kCubeEdge + 2);
+
+// Of effects, all of a pack drawn at once.
+struct EffectGpuBytes {
+  std::uint64_t materials = 0, curves = 0, ramps = 0, maps = 0, emitters = 0;
+  std::uint64_t tracks = 0;     // points of all frames
+  std::uint64_t particles = 0;  // as many as may be alive
+  std::uint64_t total() const;
+};
+EffectGpuBytes effectGpuBytes(const EffectTables& tables);
 
 // Adds a distinct brick of a known encoding to the grid frame's counts; a constant adds nothing.
 void countBrick(GridFrame& gridFrame, std::uint32_t encoding);
