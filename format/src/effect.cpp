@@ -65,7 +65,7 @@ std::uint64_t effectBytes(const EffectTables& tables) {
   const auto bytes = [](const auto& records) { return std::as_bytes(std::span(records)).size(); };
   return bytes(tables.tracks) + bytes(tables.trackFrames) + bytes(tables.trackBytes) + bytes(tables.effects) +
          bytes(tables.emitters) + bytes(tables.spans) + bytes(tables.materials) + bytes(tables.curves) +
-         bytes(tables.ramps) + bytes(tables.maps);
+         bytes(tables.ramps) + bytes(tables.maps) + bytes(tables.surfacePoints);
 }
 
 float sampleCurve(const CurveRow& row, float x) {

@@ -169,7 +169,9 @@ class EffectRules {
     const auto moderate = [](std::span<const float> values) {
       return allWithin(values, -kMaxMagnitude, kMaxMagnitude);
     };
-    require((emitter.flags & ~(kEmitterAlign | kEmitterRandomStart)) == 0, "flags", place);
+    const bool mesh = emitter.shape == static_cast<std::uint32_t>(EmitterShape::mesh);
+    const std::uint32_t known = kEmitterAlign | kEmitterRandomStart | (mesh ? kEmitterNormal : 0);
+    require((emitter.flags & ~known) == 0, "flags", place);
     require(emitter.shape < kEmitterShapeCount && emitter.kind < kKindCount, "shape or kind", place);
     const bool ball = emitter.shape != static_cast<std::uint32_t>(EmitterShape::sphere) || emitter.extent[1] <= 1;
     require(allWithin(emitter.extent, 0, kMaxMagnitude) && ball, "extent", place);
@@ -209,6 +211,16 @@ class EffectRules {
     }
     if (emitter.track != kNoTrack && emitter.track >= tables_.tracks.size()) {
       sink_.report(Rule::effectReference, place, fmt::format("Track {} of {}.", emitter.track, tables_.tracks.size()));
+    }
+    const std::uint64_t pointsEnd = std::uint64_t{emitter.firstPoint} + emitter.pointCount;
+    const bool mesh = emitter.shape == static_cast<std::uint32_t>(EmitterShape::mesh);
+    const bool points = mesh ? emitter.pointCount >= 1 && emitter.pointCount <= kMaxSurfacePoints &&
+                                   pointsEnd <= tables_.surfacePoints.size()
+                             : pointsEnd == 0;
+    if (!points) {
+      sink_.report(Rule::emitterSurface, place,
+                   fmt::format("{} points from {} of {}.", emitter.pointCount, emitter.firstPoint,
+                               tables_.surfacePoints.size()));
     }
     if (emitter.material >= tables_.materials.size()) {
       sink_.report(Rule::effectReference, place,

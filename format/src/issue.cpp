@@ -155,6 +155,8 @@ constexpr IssueKind kCatalogue[] = {
           "The tracks divide their frames, and these the bytes, in order and without remainder, within their limits."),
     error(Rule::trackData, "track-data",
           "A track's frame is a Draco point cloud of so many points, in order of their numbers, at finite places."),
+    error(Rule::emitterSurface, "emitter-surface",
+          "An emitter on a mesh has 1 to 65536 surface points, which exist; any other has none."),
 };
 
 consteval bool ascending() {

@@ -65,6 +65,7 @@ void readEffects(const ByteSource& source, std::span<const SectionEntry> section
   readTable(source, sections, kSectionTracks, effects.tracks, sink);
   readTable(source, sections, kSectionTrackFrames, effects.trackFrames, sink);
   readTable(source, sections, kSectionTrackBytes, effects.trackBytes, sink);
+  readTable(source, sections, kSectionSurfaces, effects.surfacePoints, sink);
 }
 
 }  // namespace

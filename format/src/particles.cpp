@@ -172,14 +172,23 @@ class EmitterRun {
       }
       case EmitterShape::box:
         return {extent[0] * (2 * a - 1), extent[1] * (2 * b - 1), extent[2] * (2 * c - 1)};
+      case EmitterShape::mesh:
+        return placeOf(surfacePoint(dice), emitter_.extent);
     }
     return {0, 0, 0};
+  }
+
+  // On which a particle of a mesh is born.
+  const SurfacePoint& surfacePoint(const Dice& dice) const {
+    const auto index = static_cast<std::uint32_t>(dice.draw(kDrawPlace) * emitter_.pointCount);
+    return tables_.surfacePoints[emitter_.firstPoint + index];
   }
 
   Vec3 startVelocity(const Dice& dice, double born) const {
     const Vec3 cone = coneDirection(static_cast<double>(emitter_.spreadCosine), dice.draw(kDrawDirection),
                                     dice.draw(kDrawDirection + 1));
-    Vec3 start = around(vec(emitter_.direction), cone);
+    const bool outward = (emitter_.flags & kEmitterNormal) != 0;
+    Vec3 start = around(outward ? normalOf(surfacePoint(dice)) : vec(emitter_.direction), cone);
     const double speed = dice.between(kDrawSpeed, emitter_.speed);
     const Vec3 own = velocity(born);
     for (std::size_t i = 0; i < 3; ++i)

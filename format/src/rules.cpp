@@ -40,6 +40,7 @@ constexpr SectionKind kSectionKinds[] = {
     {"TRCK", kSectionTracks, 0},
     {"TRFR", kSectionTrackFrames, 0},
     {"TRPT", kSectionTrackBytes, 0},
+    {"SURF", kSectionSurfaces, 0},
 };
 
 const SectionKind* kindOfSection(std::uint32_t type) {

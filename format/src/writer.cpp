@@ -143,6 +143,7 @@ void PackWriter::Impl::writeEffects(const EffectTables& effects) {
   write(kSectionTracks, effects.tracks);
   write(kSectionTrackFrames, effects.trackFrames);
   write(kSectionTrackBytes, effects.trackBytes);
+  write(kSectionSurfaces, effects.surfacePoints);
 }
 
 void PackWriter::Impl::writeHeader() {

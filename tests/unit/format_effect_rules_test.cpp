@@ -81,6 +81,11 @@ EffectTables fullEffects() {
     tables.trackFrames.push_back({tables.trackBytes.size(), static_cast<std::uint32_t>(bytes.size()), 3});
     tables.trackBytes.insert(tables.trackBytes.end(), bytes.begin(), bytes.end());
   }
+  tables.emitters[0].shape = static_cast<std::uint32_t>(EmitterShape::mesh);
+  tables.emitters[0].flags = kEmitterNormal;
+  std::fill_n(tables.emitters[0].extent, 3, 2.0f);
+  tables.emitters[0].pointCount = 3;
+  tables.surfacePoints = {{{0, 0, 0}, {0, 0}}, {{32767, -32767, -32768}, {127, -128}}, {{1, 2, 3}, {-100, 90}}};
   for (CurveRow& row : tables.curves) std::fill_n(row.values, kCurveSamples, 0.5f);
   return tables;
 }
@@ -126,6 +131,7 @@ TEST(EffectRules, SoundOnesComeBackAsTheyWere) {
   EXPECT_TRUE(same(pack->effects().maps, tables.maps));
   EXPECT_TRUE(same(pack->effects().tracks, tables.tracks));
   EXPECT_TRUE(same(pack->effects().trackFrames, tables.trackFrames));
+  EXPECT_TRUE(same(pack->effects().surfacePoints, tables.surfacePoints));
   ASSERT_EQ(pack->effects().trackPoints.size(), 3u);
   EXPECT_EQ(pack->effects().trackPoints[1][2].number, 4u);
   EXPECT_NEAR(pack->effects().trackPoints[1][2].position[0], 3, 1e-3f);
@@ -153,8 +159,10 @@ TEST(EffectRules, EveryBrokenRuleIsTold) {
       {702, [](EffectTables& t) { t.effects[0].duration = t.spans[0].end = 0; }},
       {702, [](EffectTables& t) { t.effects[0].duration = 3601; }},
       {703, [](EffectTables& t) { t.spans[0].count = 140000; }},
-      {704, [](EffectTables& t) { t.emitters[0].flags = 4; }},
-      {704, [](EffectTables& t) { t.emitters[0].shape = 3; }},
+      {704, [](EffectTables& t) { t.emitters[0].flags = 8; }},
+      {704, [](EffectTables& t) { t.emitters[1].flags = kEmitterNormal; }},
+      {704, [](EffectTables& t) { t.emitters[1].shape = 4; }},
+      {704, [](EffectTables& t) { t.emitters[0].extent[2] = kNan; }},
       {704, [](EffectTables& t) { t.emitters[0].kind = 4; }},
       {704, [](EffectTables& t) { t.emitters[1].extent[1] = 1.5f; }},
       {704, [](EffectTables& t) { t.emitters[0].position[2] = kNan; }},
@@ -208,8 +216,16 @@ TEST(EffectRules, EveryBrokenRuleIsTold) {
       {710, [](EffectTables& t) { t.trackBytes.push_back({}); }},
       {711, [](EffectTables& t) { t.trackFrames[0].count = 1; }},
       {711, [](EffectTables& t) { t.trackBytes[0] = std::byte{'X'}; }},
+      {712, [](EffectTables& t) { t.emitters[0].pointCount = 0; }},
+      {712, [](EffectTables& t) { t.emitters[0].pointCount = 4; }},
+      {712, [](EffectTables& t) { t.emitters[0].firstPoint = 1; }},
+      {712, [](EffectTables& t) { t.emitters[0].firstPoint = 0xffffffff; }},
+      {712, [](EffectTables& t) { t.surfacePoints.resize(t.emitters[0].pointCount = kMaxSurfacePoints + 1); }},
+      {712, [](EffectTables& t) { t.surfacePoints.clear(); }},
+      {712, [](EffectTables& t) { t.emitters[1].firstPoint = 1; }},
+      {712, [](EffectTables& t) { t.emitters[1].pointCount = 1; }},
       {215, [](EffectTables& t) { t.effects[0].reserved[4] = 1; }},
-      {215, [](EffectTables& t) { t.emitters[0].reserved[6] = 1; }},
+      {215, [](EffectTables& t) { t.emitters[0].reserved[4] = 1; }},
   };
   for (std::size_t i = 0; i < faults.size(); ++i) {
     EffectTables tables = fullEffects();
@@ -252,7 +268,7 @@ TEST(EffectRules, WhatOpensDoesNoHarm) {
   int opened = 0;
   for (int round = 0; round < 4000; ++round) {
     std::vector<std::byte> bytes = sound;
-    constexpr std::size_t kSections[] = {8, 9, 10, 11, 12, 15, 16, 17, 17};  // without ramps and maps
+    constexpr std::size_t kSections[] = {8, 9, 10, 11, 12, 15, 16, 17, 17, 18};  // without ramps and maps
     const SectionEntry& section = pack->sections()[kSections[random() % std::size(kSections)]];
     for (int i = 0; i < 1 + round % 3; ++i) {
       bytes[section.offset + random() % section.size] = static_cast<std::byte>(random() & 255);
@@ -267,21 +283,16 @@ TEST(EffectRules, WhatOpensDoesNoHarm) {
 }
 
 TEST(EffectRules, SectionsOfHalfARecordAreRefused) {
-  EffectTables tables = fullEffects();
-  tables.emitters[1].track = kNoTrack;
-  tables.tracks.clear();
-  tables.trackFrames.clear();
-  tables.trackBytes.clear();
-  std::vector<std::byte> bytes = packBytes(tables);
+  std::vector<std::byte> bytes = packBytes(fullEffects());
   const Result<Pack> pack = Pack::open(makeMemorySource(bytes));
   ASSERT_TRUE(pack);
   const auto& sections = pack->sections();
-  ASSERT_EQ(sections.back().type, kSectionCubes);
+  ASSERT_EQ(sections.back().type, kSectionSurfaces);
   bytes.pop_back();
   tests::putAt(bytes, 64 + (sections.size() - 1) * sizeof(SectionEntry) + offsetof(SectionEntry, size),
                sections.back().size - 1);
   tests::sealAll(bytes);
-  EXPECT_EQ(issueIds(bytes), (std::vector<int>{201, 706}));  // and its maps are not there
+  EXPECT_EQ(issueIds(bytes), (std::vector<int>{201, 712}));  // and its points are not there
 }
 
 TEST(EffectRules, TheWriterNeedsToKnowOfEffects) {

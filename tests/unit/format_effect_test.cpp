@@ -187,6 +187,62 @@ TEST(Particles, AreBornInTheirShapes) {
   EXPECT_NEAR(widest, 3, 0.05f);
 }
 
+// Every point is as likely as another; its particle is born there.
+TEST(Particles, AreBornOnPointsOfASurface) {
+  EffectTables tables = plainEffect();
+  EmitterRecord& emitter = tables.emitters[0];
+  tables.spans[0] = {0, 0, 0, 8000};
+  emitter.shape = static_cast<std::uint32_t>(EmitterShape::mesh);
+  emitter.extent[0] = 1;
+  emitter.extent[1] = 2;
+  emitter.position[0] = 10;
+  emitter.firstPoint = 1;
+  emitter.pointCount = 4;
+  tables.surfacePoints.resize(6);
+  for (std::int16_t i = 0; i < 6; ++i) tables.surfacePoints[static_cast<std::size_t>(i)].place[0] = i;
+  tables.surfacePoints[2].place[1] = -32768;
+  std::array<int, 6> born{};
+  for (const Particle& p : particlesAt(tables, 0, 0)) {
+    const auto point = static_cast<std::size_t>(std::lround((p.center[0] - 10) * 32767));
+    ASSERT_LT(point, 6u);
+    ++born[point];
+    EXPECT_EQ(p.center[1], point == 2 ? -2.0f : 0.0f);
+    EXPECT_EQ(p.center[2], 0.0f);
+  }
+  EXPECT_EQ(born[0] + born[5], 0);
+  for (std::size_t i = 1; i < 5; ++i) EXPECT_NEAR(born[i], 2000, 150) << i;  // four deviations
+}
+
+// The octahedron's corners, faces and folded edges; then all patterns have length 1.
+TEST(Particles, SetOutAlongNormals) {
+  EXPECT_EQ(normalOf({{}, {0, 0}}), (Vec3{0, 0, 1}));
+  EXPECT_EQ(normalOf({{}, {127, 0}}), (Vec3{1, 0, 0}));
+  EXPECT_EQ(normalOf({{}, {0, -128}}), (Vec3{0, -1, 0}));
+  for (const int corner : {-127, 127}) {
+    EXPECT_EQ(normalOf({{}, {static_cast<std::int8_t>(corner), 127}}), (Vec3{0, 0, -1}));
+  }
+  for (int pattern = 0; pattern < 65536; ++pattern) {
+    const Vec3 n = normalOf({{}, {static_cast<std::int8_t>(pattern & 255), static_cast<std::int8_t>(pattern >> 8)}});
+    ASSERT_NEAR(n[0] * n[0] + n[1] * n[1] + n[2] * n[2], 1, 1e-12) << pattern;
+  }
+  EffectTables tables = plainEffect();
+  EmitterRecord& emitter = tables.emitters[0];
+  tables.spans[0] = {0, 0, 0, 200};
+  emitter.shape = static_cast<std::uint32_t>(EmitterShape::mesh);
+  emitter.pointCount = 1;
+  emitter.speed[0] = emitter.speed[1] = 3;
+  emitter.spreadCosine = 0.9f;
+  tables.surfacePoints = {{{}, {0, -127}}};
+  for (const std::uint32_t flags : {0u, kEmitterNormal}) {
+    emitter.flags = flags;
+    const float up = flags == 0 ? 1.0f : -1.0f;  // `direction`, or the normal
+    for (const Particle& p : particlesAt(tables, 0, 1)) {
+      EXPECT_GE(p.center[1] * up, 0.8999f * 3);
+      EXPECT_NEAR(p.center[0] * p.center[0] + p.center[1] * p.center[1] + p.center[2] * p.center[2], 9, 1e-3f);
+    }
+  }
+}
+
 TEST(Particles, SpreadFillsItsCone) {
   EffectTables tables = plainEffect();
   EmitterRecord& emitter = tables.emitters[0];

@@ -11,6 +11,7 @@
 #include "billow/format/emitter.h"
 #include "billow/format/layout.h"
 #include "billow/format/particle.h"
+#include "billow/format/surface.h"
 #include "billow/format/track.h"
 
 namespace billow::format {
@@ -71,6 +72,7 @@ struct EffectTables {
   std::vector<TrackRecord> tracks;
   std::vector<TrackFrame> trackFrames;
   std::vector<std::byte> trackBytes;
+  std::vector<SurfacePoint> surfacePoints;
   std::vector<std::vector<TrackPoint>> trackPoints;  // the frames decoded, as an open pack has them; not written
 
   bool empty() const { return effects.empty(); }

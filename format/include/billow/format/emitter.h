@@ -24,9 +24,11 @@ struct StringRef {
 BILLOW_E_CONST kShapePoint = 0u;
 BILLOW_E_CONST kShapeSphere = 1u;
 BILLOW_E_CONST kShapeBox = 2u;
+BILLOW_E_CONST kShapeMesh = 3u;
 
 BILLOW_E_CONST kEmitterAlign = 1u;        // EmitterRecord.flags: own x axis along the velocity
 BILLOW_E_CONST kEmitterRandomStart = 2u;  // rotation begins anywhere
+BILLOW_E_CONST kEmitterNormal = 4u;       // with shape mesh: `direction` is the surface's normal
 
 BILLOW_E_CONST kNoTrack = 0xffffffffu;  // EmitterRecord.track: motion in closed form
 
@@ -49,7 +51,7 @@ struct EmitterRecord {
   BILLOW_E_U32 spanCount;
   BILLOW_E_U32 flags;
   BILLOW_E_U32 shape;  // EmitterShape
-  float extent[3];     // sphere: radius, share of the radius that is hollow, 0; box: half sides; point: 0
+  float extent[3];     // sphere: radius, share of the radius that is hollow, 0; box, mesh: half sides; point: 0
   float position[3];
   BILLOW_E_U32 positionRow;  // of three, added to `position`
   float inheritance;         // share of the emitter's own velocity that particles begin with
@@ -78,14 +80,21 @@ struct EmitterRecord {
   BILLOW_E_U32 mapCount;  // several: from one to the next, in a circle
   float mapsPerSecond;
   BILLOW_E_U32 material;
-  BILLOW_E_U32 track;  // kNoTrack: motion in closed form, by the numbers above
-  BILLOW_E_U32 reserved[7];
+  BILLOW_E_U32 track;       // kNoTrack: motion in closed form, by the numbers above
+  BILLOW_E_U32 firstPoint;  // of SURF, with shape mesh, else 0
+  BILLOW_E_U32 pointCount;
+  BILLOW_E_U32 reserved[5];
 };
 BILLOW_E_SIZE(EmitterRecord, 256);
 
 #ifdef __cplusplus
-enum class EmitterShape : std::uint32_t { point = kShapePoint, sphere = kShapeSphere, box = kShapeBox };
-inline constexpr std::uint32_t kEmitterShapeCount = 3;
+enum class EmitterShape : std::uint32_t {
+  point = kShapePoint,
+  sphere = kShapeSphere,
+  box = kShapeBox,
+  mesh = kShapeMesh
+};
+inline constexpr std::uint32_t kEmitterShapeCount = 4;
 }  // namespace billow::format
 #endif
 

@@ -151,6 +151,7 @@ inline constexpr std::uint32_t kSectionCubes = fourcc('C', 'U', 'B', 'E');      
 inline constexpr std::uint32_t kSectionTracks = fourcc('T', 'R', 'C', 'K');       // TrackRecord[]
 inline constexpr std::uint32_t kSectionTrackFrames = fourcc('T', 'R', 'F', 'R');  // TrackFrame[]
 inline constexpr std::uint32_t kSectionTrackBytes = fourcc('T', 'R', 'P', 'T');   // point clouds, one after another
+inline constexpr std::uint32_t kSectionSurfaces = fourcc('S', 'U', 'R', 'F');     // SurfacePoint[]
 
 inline constexpr std::uint32_t kSectionRequired = 1;  // SectionEntry.flags: a reader that does not know it must refuse
 
