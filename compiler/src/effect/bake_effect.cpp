@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <utility>
 
 #include "effect/noise_map.h"
 #include "effect/simulate.h"
+#include "effect/surface_points.h"
+#include "stages.h"
 
 namespace billow::compiler {
 namespace {
@@ -25,9 +28,9 @@ class Baker {
     record.seed = effect.seed;
     record.duration = effect.duration;
     for (std::uint32_t e = 0; e < record.emitterCount; ++e) {
-      addEmitter(effect.emitters[e], effect.duration);
-      if (!needsTrack(effect.emitters[e])) continue;
       const std::string where = fmt::format("{}: emitters[{}]", effect.file, e);
+      addEmitter(effect.emitters[e], effect.duration, where);
+      if (!needsTrack(effect.emitters[e])) continue;
       const TrackPoints points = simulate(birthsOf(effects_, record, e), effect.emitters[e], where);
       effects_.emitters.back().track =
           addTrack(points, effect.emitters[e].trackRate, effect.emitters[e].trackError, where, effects_);
@@ -36,7 +39,7 @@ class Baker {
   }
 
  private:
-  void addEmitter(const EmitterDescription& emitter, float duration) {
+  void addEmitter(const EmitterDescription& emitter, float duration, const std::string& where) {
     format::EmitterRecord record = numbersOf(emitter);
     record.name = tables_.addString(emitter.name);
     record.firstSpan = static_cast<std::uint32_t>(effects_.spans.size());
@@ -44,6 +47,7 @@ class Baker {
     effects_.spans.insert(effects_.spans.end(), emitter.spans.begin(), emitter.spans.end());
     const bool moves = emitter.position.times.size() > 1;
     record.positionRow = moves ? rows(emitter.position, 3, static_cast<double>(duration)) : format::kNoRow;
+    if (emitter.mesh) addSurface(*emitter.mesh, emitter.spans.back(), where, record);
     record.radiusRow = rows(emitter.radius, 1, 1);
     record.opacityRow = rows(emitter.opacity, 1, 1);
     record.diffuseRow = rows(emitter.diffuse, 3, 1);
@@ -60,6 +64,21 @@ class Baker {
     record.material = material(emitter);
     record.track = format::kNoTrack;
     effects_.emitters.push_back(record);
+  }
+
+  // The shape's middle is that of the mesh, not the origin of its file.
+  void addSurface(const MeshShape& mesh, const format::SpawnSpan& last, const std::string& where,
+                  format::EmitterRecord& record) {
+    const Surface surface = placePoints(mesh, pointsFor(std::uint64_t{last.first} + last.count));
+    record.firstPoint = shared(effects_.surfacePoints, surface.points);
+    record.pointCount = static_cast<std::uint32_t>(surface.points.size());
+    std::copy(surface.halfSides.begin(), surface.halfSides.end(), record.extent);
+    for (std::size_t i = 0; i < 3; ++i) {
+      record.position[i] = static_cast<float>(static_cast<double>(record.position[i]) + surface.middle[i]);
+      if (std::abs(record.position[i]) <= format::kMaxMagnitude) continue;
+      throw Error(Fault::input, fmt::format("{}.position: its mesh's middle would be at {}; expected at most {}", where,
+                                            record.position[i], format::kMaxMagnitude));
+    }
   }
 
   // The first of `count` consecutive rows, one a component, over [0, end].

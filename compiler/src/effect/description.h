@@ -9,6 +9,7 @@
 
 #include "billow/format/effect.h"
 #include "effect/image.h"
+#include "mesh/mesh.h"
 
 namespace billow::compiler {
 
@@ -62,6 +63,12 @@ struct Attractor {
   double radius;    // where it is greatest
 };
 
+// A surface on which particles are born.
+struct MeshShape {
+  TriangleList triangles;
+  std::array<double, 3> scale{1, 1, 1};
+};
+
 struct EmitterDescription {
   std::string name;
   format::EmitterRecord record{};  // its numbers; what refers to tables comes with the tables
@@ -72,6 +79,7 @@ struct EmitterDescription {
   format::ParticleMaterial material{};  // likewise
   Keys profile;
   std::vector<RampRow> diffuseRamp, emissionRamp;
+  std::optional<MeshShape> mesh;  // the shape
   std::optional<NoiseMap> map;
   std::optional<CurlNoise> curlNoise;
   std::optional<Attractor> attractor;

@@ -24,8 +24,38 @@ void readVector(const Value& value, float (&into)[3]) {
   std::copy(numbers.begin(), numbers.end(), into);
 }
 
-void readShape(const Value& value, format::EmitterRecord& record) {
-  const std::size_t type = value.at("type").word({"point", "sphere", "box"});
+// Lengths that a pack may have.
+void checkExtent(const MeshShape& mesh, const Value& value) {
+  for (const Triangle& triangle : mesh.triangles) {
+    for (const Vertex& vertex : triangle) {
+      for (std::size_t i = 0; i < 3; ++i) {
+        const double place = static_cast<double>(vertex[i]) * mesh.scale[i];
+        if (std::abs(place) > kMost)
+          value.fail(fmt::format("a mesh within {} of its origin; it goes to {}", kMost, place));
+      }
+    }
+  }
+}
+
+MeshShape readMeshShape(const Value& value, const std::filesystem::path& folder) {
+  static constexpr Range kScale{1e-6, kMost};
+  value.requireKeys({"type", "file", "scale"});
+  MeshShape mesh;
+  if (const auto scale = value.find("scale")) {
+    if (scale->isArray()) {
+      mesh.scale = scale->numbers<3>(kScale);
+    } else {
+      mesh.scale.fill(scale->number(kScale));
+    }
+  }
+  mesh.triangles = readMesh((folder / value.at("file").text("a mesh *.drc, *.obj, *.gltf or *.glb")).string());
+  checkExtent(mesh, value);
+  return mesh;
+}
+
+void readShape(const Value& value, const std::filesystem::path& folder, EmitterDescription& emitter) {
+  format::EmitterRecord& record = emitter.record;
+  const std::size_t type = value.at("type").word({"point", "sphere", "box", "mesh"});
   record.shape = static_cast<std::uint32_t>(type);
   switch (static_cast<format::EmitterShape>(type)) {
     case format::EmitterShape::point:
@@ -39,21 +69,32 @@ void readShape(const Value& value, format::EmitterRecord& record) {
       value.requireKeys({"type", "halfSides"});
       const auto sides = value.at("halfSides").singles<3>(kPositive);
       std::copy(sides.begin(), sides.end(), record.extent);
+      return;
     }
+    case format::EmitterShape::mesh:
+      emitter.mesh = readMeshShape(value, folder);
   }
 }
 
-// The vector at unit length.
-void readDirection(const Value& value, float (&into)[3]) {
+// The vector at unit length; or "normal".
+void readDirection(const Value& value, format::EmitterRecord& record) {
+  if (value.isString()) {
+    value.word({"normal"});
+    if (record.shape != static_cast<std::uint32_t>(format::EmitterShape::mesh)) {
+      value.fail("a shape of type \"mesh\" beside it, which has normals");
+    }
+    record.flags |= format::kEmitterNormal;
+    return;
+  }
   const auto v = value.numbers<3>(kAny);
   const double length = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
   if (!(length > 1e-6)) value.fail("a direction, which is not 0");
-  for (std::size_t i = 0; i < 3; ++i) into[i] = static_cast<float>(v[i] / length);
+  for (std::size_t i = 0; i < 3; ++i) record.direction[i] = static_cast<float>(v[i] / length);
 }
 
 void readVelocity(const Value& value, format::EmitterRecord& record) {
   value.requireKeys({"direction", "speed", "spread"});
-  if (const auto direction = value.find("direction")) readDirection(*direction, record.direction);
+  if (const auto direction = value.find("direction")) readDirection(*direction, record);
   readSpan(value.at("speed"), kAny, record.speed);
   if (const auto spread = value.find("spread")) {
     record.spreadCosine = static_cast<float>(format::sineCosine(spread->number({0, 180}) / 360).cosine);
@@ -152,7 +193,7 @@ EmitterDescription readEmitter(const Value& value, float duration, const std::fi
   emitter.name = value.at("name").name("an emitter's name");
   record.direction[1] = 1;
   record.spreadCosine = 1;
-  if (const auto shape = value.find("shape")) readShape(*shape, record);
+  if (const auto shape = value.find("shape")) readShape(*shape, folder, emitter);
   if (const auto position = value.find("position")) emitter.position = readVectorCurve(*position, {0, seconds}, kAny);
   if (const auto rate = value.find("rate")) readRate(*rate, seconds, emitter);
   if (const auto bursts = value.find("bursts")) readBursts(*bursts, seconds, emitter);
