@@ -128,7 +128,7 @@ enum class Rule : std::uint16_t {
   effectTable = 709,
   trackRanges = 710,
   trackData = 711,
-  emitterSurface = 712,
+  emitterSurface = 714,
 };
 
 // The catalogue's entry; the id must be in it.

@@ -151,13 +151,13 @@ TEST(EffectMesh, PointsAreAsManyAsTheirParticlesNeedAndStoredOnce) {
   document["emitters"][1]["name"] = "more";
   document["emitters"].push_back(document["emitters"][0]);
   document["emitters"][2]["name"] = "many";
-  document["emitters"][2]["rate"] = 100;
+  document["emitters"][2]["rate"] = 1000;
   const format::EffectTables tables = bake(document).effects;
   EXPECT_EQ(tables.emitters[0].pointCount, 1024u);
   EXPECT_EQ(tables.emitters[1].firstPoint, 0u);
   EXPECT_EQ(tables.emitters[2].firstPoint, 1024u);
-  EXPECT_EQ(tables.emitters[2].pointCount, 200u * 16);
-  EXPECT_EQ(tables.surfacePoints.size(), 1024u + 200 * 16);
+  EXPECT_EQ(tables.emitters[2].pointCount, 2000u * 4);
+  EXPECT_EQ(tables.surfacePoints.size(), 1024u + 2000 * 4);
   EXPECT_NE(tables.emitters[0].positionRow, format::kNoRow);
   EXPECT_EQ(pointsFor(1u << 20), format::kMaxSurfacePoints);
 }
@@ -169,7 +169,8 @@ TEST(EffectMesh, TheSameBitsEverywhere) {
     for (Vertex& v : triangle) v[2] = v[0] * v[1] / 3;
   }
   const Surface surface = placePoints({mesh, {1, 1.7, 0.3}}, 4096);
-  EXPECT_EQ(XXH3_64bits(surface.points.data(), surface.points.size() * sizeof(format::SurfacePoint)), 16262032065240024378u);
+  EXPECT_EQ(XXH3_64bits(surface.points.data(), surface.points.size() * sizeof(format::SurfacePoint)),
+            16262032065240024378u);
 }
 
 TEST(EffectMesh, WhatIsRefused) {
@@ -190,7 +191,9 @@ TEST(EffectMesh, WhatIsRefused) {
                  "expected a mesh within 1000000 of its origin; it goes to 2000000"},
                 {"/position", {0, 1e6, 0}, ""},
                 {"/shape/radius", 1, "radius"},
-                {"/velocity", {{"speed", 1}, {"direction", "up"}}, "emitters[0].velocity.direction is \"up\""}};
+                {"/velocity",
+                 {{"speed", 1}, {"direction", "up"}},
+                 "emitters[0].velocity.direction is \"up\"; expected three numbers, or \"normal\""}};
   ASSERT_NO_THROW(bake(onMesh(cube)));
   for (const auto& fault : faults) {
     json document = onMesh(cube);

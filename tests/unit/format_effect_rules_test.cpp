@@ -216,14 +216,14 @@ TEST(EffectRules, EveryBrokenRuleIsTold) {
       {710, [](EffectTables& t) { t.trackBytes.push_back({}); }},
       {711, [](EffectTables& t) { t.trackFrames[0].count = 1; }},
       {711, [](EffectTables& t) { t.trackBytes[0] = std::byte{'X'}; }},
-      {712, [](EffectTables& t) { t.emitters[0].pointCount = 0; }},
-      {712, [](EffectTables& t) { t.emitters[0].pointCount = 4; }},
-      {712, [](EffectTables& t) { t.emitters[0].firstPoint = 1; }},
-      {712, [](EffectTables& t) { t.emitters[0].firstPoint = 0xffffffff; }},
-      {712, [](EffectTables& t) { t.surfacePoints.resize(t.emitters[0].pointCount = kMaxSurfacePoints + 1); }},
-      {712, [](EffectTables& t) { t.surfacePoints.clear(); }},
-      {712, [](EffectTables& t) { t.emitters[1].firstPoint = 1; }},
-      {712, [](EffectTables& t) { t.emitters[1].pointCount = 1; }},
+      {714, [](EffectTables& t) { t.emitters[0].pointCount = 0; }},
+      {714, [](EffectTables& t) { t.emitters[0].pointCount = 4; }},
+      {714, [](EffectTables& t) { t.emitters[0].firstPoint = 1; }},
+      {714, [](EffectTables& t) { t.emitters[0].firstPoint = 0xffffffff; }},
+      {714, [](EffectTables& t) { t.surfacePoints.resize(t.emitters[0].pointCount = kMaxSurfacePoints + 1); }},
+      {714, [](EffectTables& t) { t.surfacePoints.clear(); }},
+      {714, [](EffectTables& t) { t.emitters[1].firstPoint = 1; }},
+      {714, [](EffectTables& t) { t.emitters[1].pointCount = 1; }},
       {215, [](EffectTables& t) { t.effects[0].reserved[4] = 1; }},
       {215, [](EffectTables& t) { t.emitters[0].reserved[4] = 1; }},
   };
@@ -292,7 +292,7 @@ TEST(EffectRules, SectionsOfHalfARecordAreRefused) {
   tests::putAt(bytes, 64 + (sections.size() - 1) * sizeof(SectionEntry) + offsetof(SectionEntry, size),
                sections.back().size - 1);
   tests::sealAll(bytes);
-  EXPECT_EQ(issueIds(bytes), (std::vector<int>{201, 712}));  // and its points are not there
+  EXPECT_EQ(issueIds(bytes), (std::vector<int>{201, 714}));  // and its points are not there
 }
 
 TEST(EffectRules, TheWriterNeedsToKnowOfEffects) {

@@ -79,7 +79,7 @@ void readShape(const Value& value, const std::filesystem::path& folder, EmitterD
 // The vector at unit length; or "normal".
 void readDirection(const Value& value, format::EmitterRecord& record) {
   if (value.isString()) {
-    value.word({"normal"});
+    if (value.text("a direction") != "normal") value.fail("three numbers, or \"normal\"");
     if (record.shape != static_cast<std::uint32_t>(format::EmitterShape::mesh)) {
       value.fail("a shape of type \"mesh\" beside it, which has normals");
     }

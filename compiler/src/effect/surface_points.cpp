@@ -87,7 +87,7 @@ std::array<double, 2> evenly(std::uint32_t i) {
 }  // namespace
 
 std::uint32_t pointsFor(std::uint64_t particles) {
-  return static_cast<std::uint32_t>(std::clamp<std::uint64_t>(particles * 16, 1024, format::kMaxSurfacePoints));
+  return static_cast<std::uint32_t>(std::clamp<std::uint64_t>(particles * 4, 1024, format::kMaxSurfacePoints));
 }
 
 Surface placePoints(const MeshShape& mesh, std::uint32_t count) {

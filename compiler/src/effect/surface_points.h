@@ -22,7 +22,7 @@ struct Surface {
 // The mesh must have an area.
 Surface placePoints(const MeshShape& mesh, std::uint32_t count);
 
-// How many points serve an emitter that bears so many particles in a run: 16 for each, 1024 to kMaxSurfacePoints.
+// How many points serve an emitter that bears so many particles in a run: 4 for each, 1024 to kMaxSurfacePoints.
 std::uint32_t pointsFor(std::uint64_t particles);
 
 }  // namespace billow::compiler

@@ -21,12 +21,6 @@ TriangleList read(const std::string& path, const std::string& extension) {
   return readGltf(bytes, path);
 }
 
-bool hasArea(const Triangle& triangle) {
-  std::array<std::array<double, 3>, 3> corners{};
-  for (std::size_t i = 0; i < 3; ++i) std::copy(triangle[i].begin(), triangle[i].end(), corners[i].begin());
-  return areaVector(corners[0], corners[1], corners[2]) != std::array<double, 3>{};
-}
-
 }  // namespace
 
 void failMesh(const std::string& file, const std::string& what) {
@@ -56,6 +50,12 @@ std::array<double, 3> areaVector(const std::array<double, 3>& a, const std::arra
     result[i] = (b[u] - a[u]) * (c[v] - a[v]) - (b[v] - a[v]) * (c[u] - a[u]);
   }
   return result;
+}
+
+bool hasArea(const Triangle& triangle) {
+  std::array<std::array<double, 3>, 3> corners{};
+  for (std::size_t i = 0; i < 3; ++i) std::copy(triangle[i].begin(), triangle[i].end(), corners[i].begin());
+  return areaVector(corners[0], corners[1], corners[2]) != std::array<double, 3>{};
 }
 
 TriangleList readMesh(const std::string& path) {

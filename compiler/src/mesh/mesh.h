@@ -24,6 +24,8 @@ using TriangleList = std::vector<Triangle>;
 std::array<double, 3> areaVector(const std::array<double, 3>& a, const std::array<double, 3>& b,
                                  const std::array<double, 3>& c);
 
+bool hasArea(const Triangle& triangle);
+
 // Reads *.drc (Draco, bitstream 2.2), *.obj, *.gltf or *.glb (2.0, with the scene's transforms applied; skins and
 // morphs at rest). Throws Error with the file's name: Fault::file where it or its buffers cannot be read, Fault::input
 // where it is broken, too large, of another kind or has no area.
