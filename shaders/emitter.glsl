@@ -98,6 +98,19 @@ vec4 alongVelocity(vec3 velocity) {
 
 // ---- Birth
 
+// On which a particle of a mesh is born: place and normal as surface.h of format has them.
+uvec2 surfacePoint(EmitterRecord emitter, uint seed) {
+  uint index, rest;
+  umulExtended(hashInteger(seed + kDrawPlace) & 0xffffff00u, emitter.pointCount, index, rest);
+  return Pairs(meta.surfaces.xy).items[emitter.firstPoint + index];
+}
+
+vec3 normalOf(uvec2 point) {
+  const vec2 p = unpackSnorm4x8(point.y).zw;
+  const float z = 1.0 - abs(p.x) - abs(p.y), fold = max(-z, 0.0);
+  return normalize(vec3(p.x + (p.x < 0.0 ? fold : -fold), p.y + (p.y < 0.0 ? fold : -fold), z));
+}
+
 // In the shape, relative to its middle. A new shape is a case here.
 vec3 placeInShape(EmitterRecord emitter, uint seed) {
   const vec3 u = vec3(draw(seed, kDrawPlace), draw(seed, kDrawPlace + 1u), draw(seed, kDrawPlace + 2u));
@@ -105,6 +118,10 @@ vec3 placeInShape(EmitterRecord emitter, uint seed) {
   if (emitter.shape == kShapeSphere) {
     const float hollow = extent.y * extent.y * extent.y;
     return coneDirection(-1.0, u.x, u.y) * (extent.x * cubeRoot(hollow + (1.0 - hollow) * u.z));
+  }
+  if (emitter.shape == kShapeMesh) {
+    const uvec2 point = surfacePoint(emitter, seed);
+    return extent * vec3(unpackSnorm2x16(point.x), unpackSnorm2x16(point.y).x);
   }
   return emitter.shape == kShapeBox ? extent * (2.0 * u - 1.0) : vec3(0.0);
 }
@@ -126,7 +143,9 @@ Motion setOut(EmitterRecord emitter, uint seed, float runShare, float samplesPer
   Motion motion;
   motion.place = rowsAt(emitter.positionRow, runShare, 0.0) + placeInShape(emitter, seed);
   const vec3 cone = coneDirection(emitter.spreadCosine, draw(seed, kDrawDirection), draw(seed, kDrawDirection + 1u));
-  motion.velocity = around(vectorOf(emitter.direction), cone) * between(seed, kDrawSpeed, emitter.speed) +
+  const bool outward = (emitter.flags & kEmitterNormal) != 0u;
+  const vec3 axis = outward ? normalOf(surfacePoint(emitter, seed)) : vectorOf(emitter.direction);
+  motion.velocity = around(axis, cone) * between(seed, kDrawSpeed, emitter.speed) +
                     ownVelocity(emitter, runShare, samplesPerSecond) * emitter.inheritance;
   return motion;
 }

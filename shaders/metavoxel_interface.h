@@ -103,6 +103,7 @@ struct MetavoxelParams {
   uvec4 work;      // addresses: work items of volumes; of particles (metavoxel_work.glsl)
   uvec4 emitters;  // addresses: emitters; points of tracks
   uvec4 spawn;     // address of jobs; their number; candidates, the last of the particles
+  uvec4 surfaces;  // address of the points of meshes; unused
   uvec4 kept;      // addresses: a cell's last slot + 1; slots
   uvec4 spare;     // addresses: slots to give away; slots to fill
   uvec4 matter;    // address: albedo of each texel (RGB9E5) where they are kept; hash of the space; 1: weighted blend
@@ -112,7 +113,7 @@ struct MetavoxelParams {
   // Two a volume: hash of all that its matter depends on.
   uvec4 contents[kMaxVolumes / 2u];
 };
-BILLOW_GPU_SIZE(MetavoxelParams, 39 * 16);
+BILLOW_GPU_SIZE(MetavoxelParams, 40 * 16);
 
 #ifdef __cplusplus
 }  // namespace billow::runtime::gpu

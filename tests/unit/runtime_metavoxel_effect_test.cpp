@@ -72,19 +72,20 @@ EmitterRecord everything(format::EffectTables& tables) {
   return emitter;
 }
 
-// An effect with three emitters: the above; boxes along their velocity; and one whose points go round in a track.
+// An effect with four emitters: the above; boxes along their velocity; one whose points go round in a track; and one
+// on a mesh, along its normals.
 format::EffectTables richEffect() {
   format::EffectTables tables;
   tables.materials = plainTables().materials;
   tables.maps.resize(6);
   format::EffectRecord effect{};
-  effect.emitterCount = 3;
+  effect.emitterCount = 4;
   effect.seed = 99;
   effect.duration = 4;
   effect.flags = format::kEffectLoop | format::kEffectPrewarm;
   tables.effects.push_back(effect);
   tables.emitters.push_back(everything(tables));
-  tables.spans = {{0, 4, 0, 300}, {1, 1, 300, 40}, {2, 2.5f, 340, 60}, {0, 4, 0, 100}, {0, 0.5f, 0, 50}};
+  tables.spans = {{0, 4, 0, 300}, {1, 1, 300, 40}, {2, 2.5f, 340, 60}, {0, 4, 0, 100}, {0, 0.5f, 0, 50}, {0, 4, 0, 80}};
   tables.emitters[0].spanCount = 3;
   EmitterRecord aligned = everything(tables);
   aligned.firstSpan = 3;
@@ -100,6 +101,19 @@ format::EffectTables richEffect() {
   round.lifetime[0] = 1;
   round.lifetime[1] = 5;
   tables.emitters.push_back(round);
+  EmitterRecord mesh = aligned;
+  mesh.firstSpan = 5;
+  mesh.shape = format::kShapeMesh;
+  mesh.flags |= format::kEmitterNormal;
+  mesh.firstPoint = 2;
+  mesh.pointCount = 60;
+  tables.emitters.push_back(mesh);
+  for (int i = 0; i < 62; ++i) {
+    const auto place = static_cast<std::int16_t>(i * 1057 - 32768);
+    const auto slope = static_cast<std::int8_t>(i * 4 - 128);
+    tables.surfacePoints.push_back(
+        {{place, static_cast<std::int16_t>(~place), place}, {slope, static_cast<std::int8_t>(i * 7)}});
+  }
   tables.tracks.push_back({0, 100, 25, 0});
   tables.trackFrames.resize(100);
   tables.trackPoints.resize(100);

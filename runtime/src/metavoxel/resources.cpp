@@ -24,7 +24,7 @@ Result<void> keep(Result<T> made, T& place) {
 
 // The sections of the tables' staging memory, and where all but the last go.
 struct TableParts {
-  std::uint64_t materials, curves, ramps, emitters, points, cubes, bytes;
+  std::uint64_t materials, curves, ramps, emitters, points, surfaces, cubes, bytes;
 };
 
 TableParts tableParts(const MetavoxelSizes& sizes) {
@@ -34,6 +34,7 @@ TableParts tableParts(const MetavoxelSizes& sizes) {
   parts.ramps = regions.ramps - regions.materials;
   parts.emitters = regions.emitters - regions.materials;
   parts.points = regions.points - regions.materials;
+  parts.surfaces = regions.surfaces - regions.materials;
   parts.cubes = regions.columns - regions.materials;
   parts.bytes = parts.cubes + std::uint64_t{sizes.cubeLayers} * kFace * kFace;
   return parts;
@@ -106,6 +107,7 @@ void MetavoxelResources::addAddresses(gpu::MetavoxelParams& params) const {
   params.work = both(r.volumeWork, r.fillWork);
   params.emitters = both(r.emitters, r.points);
   params.spawn = both(r.jobs, 0);
+  params.surfaces = both(r.surfaces, 0);
   params.kept = both(r.kept, r.slots);
   params.spare = both(r.spare, r.fills);
   params.matter.x = both(r.albedo, 0).x;
@@ -226,6 +228,7 @@ void MetavoxelResources::fillTables(const MetavoxelConfig& config) {
   copy(config.tables->curves, parts.curves);
   copy(config.tables->ramps, parts.ramps);
   copy(config.tables->emitters, parts.emitters);
+  copy(config.tables->surfacePoints, parts.surfaces);
   static_assert(sizeof(format::TrackPoint) == 16);
   std::uint64_t at = parts.points;
   for (const auto& frame : config.tables->trackPoints) {

@@ -62,6 +62,7 @@ MetavoxelRegions regionsOf(const MetavoxelConfig& config, const MetavoxelSizes& 
   regions.ramps = region(bytesOf(tables.ramps));
   regions.emitters = region(bytesOf(tables.emitters));
   regions.points = region(pointBytes(tables));
+  regions.surfaces = region(bytesOf(tables.surfacePoints));
   regions.columns = region(most * sizes.inner * sizes.inner * 4);
   regions.blocks = region(sizes.blocks() * 4);
   regions.volumeWork = region(sizes.blocks() * 8);
