@@ -54,7 +54,7 @@ class MetavoxelResources {
   MetavoxelSizes sizes_{};
   std::uint64_t uploadStride_ = 0;
   std::uint32_t volumes_ = 0;
-  Buffer tables_;  // materials, curves, ramps, emitters, tracks, meshes and the cube maps' texels, until they are copied
+  Buffer tables_;  // materials, curves, ramps, emitters, tracks, meshes, cube maps' texels, until they are copied
 };
 
 }  // namespace billow::runtime
