@@ -86,8 +86,8 @@ Json toJson(const EffectSummary& effect) {
 constexpr std::pair<const char*, std::uint64_t format::EffectGpuBytes::*> kEffectKinds[] = {
     {"materials", &format::EffectGpuBytes::materials}, {"curves", &format::EffectGpuBytes::curves},
     {"ramps", &format::EffectGpuBytes::ramps},         {"maps", &format::EffectGpuBytes::maps},
-    {"emitters", &format::EffectGpuBytes::emitters},   {"tracks", &format::EffectGpuBytes::tracks},
-    {"particles", &format::EffectGpuBytes::particles}};
+    {"surfaces", &format::EffectGpuBytes::surfaces},   {"emitters", &format::EffectGpuBytes::emitters},
+    {"tracks", &format::EffectGpuBytes::tracks},       {"particles", &format::EffectGpuBytes::particles}};
 
 Json toJson(const PackSummary& pack) {
   Json json;

@@ -53,6 +53,10 @@ EmitterRecord GatheredEffects::moveEmitter(const EffectTables& source, Moved& mo
     *row = take(source.curves, *row, 1, moved.curves, tables_.curves);
   }
   record.firstMap = take(source.maps, record.firstMap, record.mapCount, moved.maps, tables_.maps);
+  if (record.pointCount != 0) {
+    record.firstPoint =
+        take(source.surfacePoints, record.firstPoint, record.pointCount, moved.surfacePoints, tables_.surfacePoints);
+  }
   record.material = addMaterial(source, moved, record.material);
   record.track = addTrack(source, moved, record.track);
   return record;

@@ -60,7 +60,7 @@ std::uint64_t packGpuBytes(std::span<const GridFrame> gridFrames,
 }
 
 std::uint64_t EffectGpuBytes::total() const {
-  return materials + curves + ramps + maps + emitters + tracks + particles;
+  return materials + curves + ramps + maps + surfaces + emitters + tracks + particles;
 }
 
 EffectGpuBytes effectGpuBytes(const EffectTables& tables) {
@@ -70,6 +70,7 @@ EffectGpuBytes effectGpuBytes(const EffectTables& tables) {
   bytes.curves = bytesOf(tables.curves);
   bytes.ramps = bytesOf(tables.ramps);
   bytes.maps = tables.maps.size() * kGpuCubeBytes;
+  bytes.surfaces = bytesOf(tables.surfacePoints);
   bytes.emitters = bytesOf(tables.emitters);
   for (const TrackFrame& frame : tables.trackFrames) bytes.tracks += std::uint64_t{frame.count} * sizeof(TrackPoint);
   for (const EffectRecord& effect : tables.effects) bytes.particles += mostAlive(tables, effect) * sizeof(Particle);

@@ -66,18 +66,15 @@ class Baker {
     effects_.emitters.push_back(record);
   }
 
-  // The shape's middle is that of the mesh, not the origin of its file.
   void addSurface(const MeshShape& mesh, const format::SpawnSpan& last, const std::string& where,
                   format::EmitterRecord& record) {
-    const Surface surface = placePoints(mesh, pointsFor(std::uint64_t{last.first} + last.count));
-    record.firstPoint = shared(effects_.surfacePoints, surface.points);
-    record.pointCount = static_cast<std::uint32_t>(surface.points.size());
-    std::copy(surface.halfSides.begin(), surface.halfSides.end(), record.extent);
-    for (std::size_t i = 0; i < 3; ++i) {
-      record.position[i] = static_cast<float>(static_cast<double>(record.position[i]) + surface.middle[i]);
-      if (std::abs(record.position[i]) <= format::kMaxMagnitude) continue;
+    const auto points = placePoints(mesh, pointsFor(std::uint64_t{last.first} + last.count)).points;
+    record.firstPoint = shared(effects_.surfacePoints, points);
+    record.pointCount = static_cast<std::uint32_t>(points.size());
+    for (const float middle : record.position) {
+      if (std::abs(middle) <= format::kMaxMagnitude) continue;
       throw Error(Fault::input, fmt::format("{}.position: its mesh's middle would be at {}; expected at most {}", where,
-                                            record.position[i], format::kMaxMagnitude));
+                                            middle, format::kMaxMagnitude));
     }
   }
 
@@ -151,6 +148,13 @@ format::EmitterRecord numbersOf(const EmitterDescription& emitter) {
   format::EmitterRecord record = emitter.record;
   if (emitter.position.times.size() == 1) {
     for (std::size_t i = 0; i < 3; ++i) record.position[i] = static_cast<float>(emitter.position.values[0][i]);
+  }
+  if (!emitter.mesh) return record;
+  // The shape's middle is that of the mesh, not the origin of its file.
+  const MeshBox box = boxOf(*emitter.mesh);
+  for (std::size_t i = 0; i < 3; ++i) {
+    record.position[i] = static_cast<float>(static_cast<double>(record.position[i]) + box.middle[i]);
+    record.extent[i] = box.halfSides[i];
   }
   return record;
 }

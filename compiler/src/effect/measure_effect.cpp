@@ -13,6 +13,7 @@
 #include "effect/bake_effect.h"
 #include "effect/noise_map.h"
 #include "effect/simulate.h"
+#include "effect/surface_points.h"
 
 namespace billow::compiler {
 namespace {
@@ -158,10 +159,18 @@ class EmitterMeasurement {
     PartError& numbers = add("numbers");
     const auto spans = std::span(tables_.spans).subspan(record_.firstSpan, record_.spanCount);
     for (const std::string& problem : {differingNumbers(record_, emitter_), differingSpans(spans, emitter_.spans),
-                                       differingMaterial(material_, emitter_.material)}) {
+                                       differingMaterial(material_, emitter_.material), differingSurface()}) {
       if (numbers.problem.empty()) numbers.problem = problem;
     }
     alike_ = numbers.sound();
+  }
+
+  std::string differingSurface() const {
+    if (!emitter_.mesh) return "";
+    const auto pack = std::span(tables_.surfacePoints).subspan(record_.firstPoint, record_.pointCount);
+    const auto described = placePoints(*emitter_.mesh, record_.pointCount).points;
+    const bool same = std::ranges::equal(std::as_bytes(pack), std::as_bytes(std::span(described)));
+    return same ? "" : "its mesh is another one in the pack";
   }
 
   // A part that both have; null where neither has it, or only one, which is a problem.

@@ -51,29 +51,10 @@ void setNormal(const Point& along, format::SurfacePoint& point) {
   point.normal[1] = octahedralStep(y);
 }
 
-// The box around all vertices.
-void measure(const MeshShape& mesh, Surface& surface) {
-  Point least{}, most{};
-  least.fill(std::numeric_limits<double>::max());
-  most.fill(std::numeric_limits<double>::lowest());
-  for (const Triangle& triangle : mesh.triangles) {
-    for (const Point& corner : scaled(triangle, mesh.scale)) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        least[k] = std::min(least[k], corner[k]);
-        most[k] = std::max(most[k], corner[k]);
-      }
-    }
-  }
+void setPlace(const Point& place, const MeshBox& box, format::SurfacePoint& point) {
   for (std::size_t k = 0; k < 3; ++k) {
-    surface.middle[k] = (least[k] + most[k]) / 2;
-    surface.halfSides[k] = static_cast<float>((most[k] - least[k]) / 2);
-  }
-}
-
-void setPlace(const Point& place, const Surface& surface, format::SurfacePoint& point) {
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double half = static_cast<double>(surface.halfSides[k]);
-    const double share = half > 0 ? (place[k] - surface.middle[k]) / half : 0;
+    const double half = static_cast<double>(box.halfSides[k]);
+    const double share = half > 0 ? (place[k] - box.middle[k]) / half : 0;
     point.place[k] = static_cast<std::int16_t>(std::floor(std::clamp(share, -1.0, 1.0) * 32767 + 0.5));
   }
 }
@@ -86,20 +67,38 @@ std::array<double, 2> evenly(std::uint32_t i) {
 
 }  // namespace
 
+MeshBox boxOf(const MeshShape& mesh) {
+  Point least{}, most{};
+  least.fill(std::numeric_limits<double>::max());
+  most.fill(std::numeric_limits<double>::lowest());
+  for (const Triangle& triangle : mesh.triangles) {
+    for (const Point& corner : scaled(triangle, mesh.scale)) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        least[k] = std::min(least[k], corner[k]);
+        most[k] = std::max(most[k], corner[k]);
+      }
+    }
+  }
+  MeshBox box;
+  for (std::size_t k = 0; k < 3; ++k) {
+    box.middle[k] = (least[k] + most[k]) / 2;
+    box.halfSides[k] = static_cast<float>((most[k] - least[k]) / 2);
+  }
+  return box;
+}
+
 std::uint32_t pointsFor(std::uint64_t particles) {
   return static_cast<std::uint32_t>(std::clamp<std::uint64_t>(particles * 4, 1024, format::kMaxSurfacePoints));
 }
 
 Surface placePoints(const MeshShape& mesh, std::uint32_t count) {
-  Surface surface;
-  measure(mesh, surface);
+  Surface surface{boxOf(mesh), std::vector<format::SurfacePoint>(count)};
   std::vector<double> areaUpTo(mesh.triangles.size());
   double area = 0;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const Corners c = scaled(mesh.triangles[t], mesh.scale);
     areaUpTo[t] = area += lengthOf(areaVector(c[0], c[1], c[2]));
   }
-  surface.points.resize(count);
   for (std::uint32_t i = 0; i < count; ++i) {
     // Anywhere in the point's share of the area, so that no order of the triangles favours one.
     const double share = (i + static_cast<double>(format::unitOf(format::hashInteger(i)))) / count;

@@ -12,9 +12,14 @@
 
 namespace billow::compiler {
 
-struct Surface {
-  std::array<double, 3> middle{};  // of the box around the mesh
+// The box around all vertices.
+struct MeshBox {
+  std::array<double, 3> middle{};
   std::array<float, 3> halfSides{};
+};
+MeshBox boxOf(const MeshShape& mesh);
+
+struct Surface : MeshBox {
   std::vector<format::SurfacePoint> points;
 };
 

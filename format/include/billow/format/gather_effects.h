@@ -29,7 +29,7 @@ class GatheredEffects {
   using Places = std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t>;
   struct Moved {
     std::map<std::tuple<std::uint32_t, float, float>, std::uint32_t> effects;
-    Places materials, curves, ramps, maps, tracks;
+    Places materials, curves, ramps, maps, surfacePoints, tracks;
   };
 
   EmitterRecord moveEmitter(const EffectTables& source, Moved& moved, const EmitterRecord& emitter);
