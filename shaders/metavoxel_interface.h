@@ -29,6 +29,8 @@ BILLOW_GPU_CONST kMaxVolumes = 8u;
 BILLOW_GPU_CONST kBinRow = 32768u;       // particles that are binned side by side: devices may not dispatch 65536
 BILLOW_GPU_CONST kCubeLayers = 6u;       // of a cube map: faces, each with a border of one texel
 BILLOW_GPU_CONST kCubeFaceTexels = 66u;  // an edge, border included
+BILLOW_GPU_CONST kFieldVoxel = 8u;       // voxels an edge of the light field's, at most where there is room for them
+BILLOW_GPU_CONST kFieldLevels = 8u;      // of its pyramid, at most
 
 BILLOW_GPU_CONST kFlagCull = 1u;        // cells that neither the eye sees nor light passes on its way to what it sees
 BILLOW_GPU_CONST kFlagReciprocal = 2u;  // 1 / (1 + d) in place of exp(-d)
@@ -37,6 +39,7 @@ BILLOW_GPU_CONST kFlagShadowMap = 8u;   // light ends at the scene
 BILLOW_GPU_CONST kFlagKeep = 16u;       // metavoxels stay filled, and of those only
 BILLOW_GPU_CONST kFlagChanged = 32u;    // the changed ones are filled anew
 BILLOW_GPU_CONST kFlagNever = 64u;      // none
+BILLOW_GPU_CONST kFlagField = 256u;     // matter lights matter
 BILLOW_GPU_CONST kParticleWords = 24u;
 
 // One thing to draw: the metavoxels at positions first to first + count - 1.
@@ -112,8 +115,12 @@ struct MetavoxelParams {
   vec4 mapZ;       // voxel z = dot(xyz, (value, voxel x, voxel y)) + w
   // Two a volume: hash of all that its matter depends on.
   uvec4 contents[kMaxVolumes / 2u];
+  uvec4 field;    // light field: its voxels along an axis of the space, of a cell; levels of its pyramid; 0
+  vec4 fieldScale;             // edge of its voxels in those of the space; share of its light that counts; 0, 0
+  uvec4 fieldMatter;           // address: what its voxels hold, by position; 0, 0
+  ivec4 levels[kFieldLevels];  // of the pyramid: first texel in its image, edge
 };
-BILLOW_GPU_SIZE(MetavoxelParams, 40 * 16);
+BILLOW_GPU_SIZE(MetavoxelParams, 51 * 16);
 
 #ifdef __cplusplus
 }  // namespace billow::runtime::gpu

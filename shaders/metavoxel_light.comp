@@ -7,6 +7,7 @@
 
 #include "metavoxel_caster.glsl"
 #include "metavoxel_column.glsl"
+#include "metavoxel_field.glsl"
 #include "phase.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -30,7 +31,7 @@ void lightTexel(Column column, uint z, uint holds, inout float depth) {
   if (matter.extinction > 0.0) {
     const vec3 voxel = texelVoxel(column.cell, texel);
     const vec3 sun = sunnyShare(voxel.z) * sunAt(max(depth + 0.5 * through, 0.0), voxel);
-    radiance += matter.albedo * matter.extinction * (sun + params.ambient.rgb);
+    radiance += matter.albedo * matter.extinction * (sun + params.ambient.rgb + surroundingsAt(voxel));
   }
   depth += through;
   imageStore(pool, ivec3(slotCorner(column.slot) + texel),

@@ -39,6 +39,8 @@ TEST_F(MetavoxelLimits, ConfigOutsideOfItsRangeIsRefused) {
   EXPECT_EQ(broken([](MetavoxelConfig& c) { c.maxParticles = 1u << 21; }), ErrorCode::argument);
   EXPECT_EQ(broken([](MetavoxelConfig& c) { c.maxVolumes = 9; }), ErrorCode::argument);
   EXPECT_EQ(broken([](MetavoxelConfig& c) { c.recordsInFlight = 0; }), ErrorCode::argument);
+  EXPECT_EQ(broken([](MetavoxelConfig& c) { c.lightField = 11; }), ErrorCode::argument);
+  EXPECT_EQ(broken([](MetavoxelConfig& c) { c.lightField = 161; }), ErrorCode::argument);
   EXPECT_EQ(broken([](MetavoxelConfig& c) { c.memoryBudget = 100'000; }), ErrorCode::budget);
 }
 
@@ -74,6 +76,10 @@ TEST_F(MetavoxelLimits, DrawOutsideOfItsRangeIsRefusedByName) {
   EXPECT_NE(broken([&](MetavoxelDraw& d) { d.center[1] = double{kNan}; }).find("center"), std::string::npos);
   EXPECT_NE(broken([](MetavoxelDraw& d) { d.sun.direction = {0, 0, 0}; }).find("sun"), std::string::npos);
   EXPECT_NE(broken([](MetavoxelDraw& d) { d.scattering.anisotropy = 1; }).find("scattering"), std::string::npos);
+  EXPECT_NE(broken([&](MetavoxelDraw& d) { d.scattering.surroundings = kNan; }).find("surroundings"),
+            std::string::npos);
+  EXPECT_NE(broken([](MetavoxelDraw& d) { d.scattering.surroundings = 1.1f; }).find("surroundings"), std::string::npos);
+  EXPECT_NE(broken([](MetavoxelDraw& d) { d.scattering.bounces = 0; }).find("bounces"), std::string::npos);
   EXPECT_NE(broken([](MetavoxelDraw& d) { d.lightExtinction[0] = -1; }).find("lightExtinction"), std::string::npos);
   const auto particle = [&](auto change) {
     std::vector<Particle> particles(3, ball({0, 0, 0}, 1, 1));

@@ -27,6 +27,10 @@ Result<void> checkDraw(const MetavoxelDraw& draw, const MetavoxelConfig& config)
   scattering.ambient = draw.scattering.ambient;
   scattering.scatteringOrders = draw.scattering.orders;
   if (badLook(scattering) != nullptr) return badArgument("scattering");
+  if (!(draw.scattering.surroundings >= 0 && draw.scattering.surroundings <= 1)) {
+    return badArgument("scattering.surroundings");
+  }
+  if (draw.scattering.bounces < 1 || draw.scattering.bounces > 8) return badArgument("scattering.bounces");
   for (const char* field : {badView(draw.view), badSun(draw.sun), badBackground(draw.background)}) {
     if (field != nullptr) return badArgument(field);
   }

@@ -98,8 +98,8 @@ class MetavoxelsImpl final : public Metavoxels {
     std::vector<VolumeSteps> volumes;
     SpawnPlan spawns;
     std::uint32_t particles;  // the host's and the effects'
-    VkPipeline clear, reset, spawn, binCount, binWrite, plan, rank, blocks, fill, sum, light, shadow, march, finish,
-        keep, spare, compare;
+    VkPipeline clear, reset, spawn, binCount, binWrite, plan, rank, blocks, fill, sum, light, inject, pyramid, gather,
+        shadow, march, finish, keep, spare, compare;
   };
 
   Result<Steps> prepare(const MetavoxelDraw& draw) {
@@ -123,6 +123,9 @@ class MetavoxelsImpl final : public Metavoxels {
                                                             {weighted ? fillWeighted : fill, &steps.fill},
                                                             {sum, &steps.sum},
                                                             {light, &steps.light},
+                                                            {inject, &steps.inject},
+                                                            {pyramid, &steps.pyramid},
+                                                            {gather, &steps.gather},
                                                             {MetavoxelPass::shadow, &steps.shadow},
                                                             {half ? marchHalf : marchSingle, &steps.march},
                                                             {half ? finishHalf : finishSingle, &steps.finish}};
@@ -228,7 +231,7 @@ class MetavoxelsImpl final : public Metavoxels {
     recordBegin(commands, draw, steps);
     recordBin(commands, steps);
     stamp(commands, draw, 1);
-    for (std::uint32_t round = 0; round < rounds; ++round) recordRound(commands, draw, steps, round, rounds);
+    recordRounds(commands, draw, steps, rounds);
     if (rounds > 1) {
       dispatch(commands, steps.finish, {}, {(draw.width + 7) / 8, (draw.height + 7) / 8, 1});
     }
@@ -305,11 +308,31 @@ class MetavoxelsImpl final : public Metavoxels {
     barrier(commands);
   }
 
-  void recordRound(VkCommandBuffer commands, const MetavoxelDraw& draw, const Steps& steps, std::uint32_t round,
-                   std::uint32_t rounds) {
-    const std::uint64_t at = resources_.sizes().regions.rounds + round * sizeof(gpu::MetavoxelRound);
-    const std::uint64_t columns = at + offsetof(gpu::MetavoxelRound, columns);
-    PassPush push{.round = round, .finish = rounds == 1 ? 1u : 0u};
+  // Light from matter to matter needs all of it before any is lit: then all rounds are filled twice, unless there is
+  // but one.
+  void recordRounds(VkCommandBuffer commands, const MetavoxelDraw& draw, const Steps& steps, std::uint32_t rounds) {
+    const bool field = fieldDrawn(draw, resources_.sizes());
+    for (std::uint32_t round = 0; round < rounds && field; ++round) {
+      recordFill(commands, draw, steps, round, round == 0);
+      indirect(commands, steps.inject, {.round = round}, roundAt(round) + offsetof(gpu::MetavoxelRound, columns));
+      barrier(commands);
+    }
+    if (field) recordField(commands, draw, steps);
+    for (std::uint32_t round = 0; round < rounds; ++round) {
+      if (!field || rounds > 1) recordFill(commands, draw, steps, round, round == 0 && !field);
+      recordLight(commands, draw, steps, {.round = round, .finish = rounds == 1 ? 1u : 0u});
+    }
+  }
+
+  std::uint64_t roundAt(std::uint32_t round) const {
+    return resources_.sizes().regions.rounds + round * sizeof(gpu::MetavoxelRound);
+  }
+
+  // Fills a round's metavoxels and sums their columns.
+  void recordFill(VkCommandBuffer commands, const MetavoxelDraw& draw, const Steps& steps, std::uint32_t round,
+                  bool first) {
+    const std::uint64_t at = roundAt(round);
+    PassPush push{.round = round};
     indirect(commands, steps.blocks, push, at + offsetof(gpu::MetavoxelRound, blocks));
     barrier(commands);
     for (std::uint32_t i = 0; i < steps.volumes.size(); ++i) {
@@ -322,16 +345,36 @@ class MetavoxelsImpl final : public Metavoxels {
     pipelines_.bindView(commands, next_);
     indirect(commands, steps.fill, push, at + offsetof(gpu::MetavoxelRound, fill));
     barrier(commands);
-    if (round == 0) stamp(commands, draw, 2);
-    indirect(commands, steps.sum, push, columns);
+    if (first) stamp(commands, draw, 2);
+    indirect(commands, steps.sum, push, roundAt(round) + offsetof(gpu::MetavoxelRound, columns));
     barrier(commands);
+  }
+
+  // Once all rounds are injected: what shines, level by level, then who gets how much of it; once a bounce.
+  void recordField(VkCommandBuffer commands, const MetavoxelDraw& draw, const Steps& steps) {
+    const FieldSizes& field = resources_.sizes().field;
+    const auto over = [&](VkPipeline pipeline, const PassPush& push, std::uint32_t edge) {
+      const std::uint32_t groups = (edge + 3) / 4;
+      dispatch(commands, pipeline, push, {groups, groups, groups});
+      barrier(commands);
+    };
+    for (std::uint32_t bounce = 0; bounce < draw.scattering.bounces; ++bounce) {
+      for (std::uint32_t level = 0; level < field.levels; ++level) {
+        over(steps.pyramid, {.round = bounce, .level = level}, field.level[level][3]);
+      }
+      over(steps.gather, {.round = bounce}, field.edge);
+    }
+  }
+
+  void recordLight(VkCommandBuffer commands, const MetavoxelDraw& draw, const Steps& steps, const PassPush& push) {
+    const std::uint64_t columns = roundAt(push.round) + offsetof(gpu::MetavoxelRound, columns);
     indirect(commands, steps.light, push, columns);
     barrier(commands);
-    if (round == 0) stamp(commands, draw, 3);
-    indirect(commands, steps.march, push, at + offsetof(gpu::MetavoxelRound, march));
+    if (push.round == 0) stamp(commands, draw, 3);
+    indirect(commands, steps.march, push, roundAt(push.round) + offsetof(gpu::MetavoxelRound, march));
     indirect(commands, steps.shadow, push, columns);
     barrier(commands);
-    if (round == 0) stamp(commands, draw, 4);
+    if (push.round == 0) stamp(commands, draw, 4);
   }
 
   void dispatch(VkCommandBuffer commands, VkPipeline pipeline, const PassPush& push,

@@ -19,6 +19,7 @@ Code codeOf(MetavoxelPass pass) {
                                spirv::kMetavoxelPlan,       spirv::kMetavoxelRank,        spirv::kMetavoxelBlocks,
                                spirv::kMetavoxelFill,       spirv::kMetavoxelFillVolume,  spirv::kMetavoxelFill,
                                spirv::kMetavoxelFillVolume, spirv::kMetavoxelSum,         spirv::kMetavoxelLight,
+                               spirv::kMetavoxelInject,     spirv::kMetavoxelPyramid,     spirv::kMetavoxelGather,
                                spirv::kMetavoxelShadow,     spirv::kMetavoxelKeep,        spirv::kMetavoxelSpare,
                                spirv::kMetavoxelCompare,    spirv::kMetavoxelMarchHalf,   spirv::kMetavoxelMarchSingle,
                                spirv::kMetavoxelFinishHalf, spirv::kMetavoxelFinishSingle};
@@ -36,13 +37,18 @@ enum SpaceBinding : std::uint32_t {
   depth,
   sceneDepth,
   sceneShadow,
+  pyramidTexels,
+  pyramidFiltered,
+  fieldTexels,
+  fieldFiltered,
   kCount
 };
 
 VkDescriptorType typeOf(std::uint32_t binding) {
   if (binding == params) return VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
   if (binding == sceneShadow) return VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE;
-  const bool filtered = binding == poolFiltered || binding == cubes;
+  const bool filtered =
+      binding == poolFiltered || binding == cubes || binding == pyramidFiltered || binding == fieldFiltered;
   return filtered ? VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER : VK_DESCRIPTOR_TYPE_STORAGE_IMAGE;
 }
 
@@ -119,7 +125,7 @@ Result<void> MetavoxelPipelines::createSets() {
   const std::uint32_t matters = inFlight_ * (volumes_ + 1);
   const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, matters + inFlight_},
                                         {VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE, matters + inFlight_},
-                                        {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 2 * inFlight_},
+                                        {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 4 * inFlight_},
                                         {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, kCount * inFlight_}};
   auto poolInfo = begin<VkDescriptorPoolCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO);
   poolInfo.maxSets = matters + inFlight_;
@@ -165,6 +171,10 @@ void MetavoxelPipelines::write(const MetavoxelResources& resources, std::uint32_
   // Where the host has no images of the scene, any of their kind are bound, and not read.
   const bool shadowed = draw.sceneShadow.view != VK_NULL_HANDLE;
   const VkImageView scene = draw.sceneDepth != VK_NULL_HANDLE ? draw.sceneDepth : draw.depth;
+  // So it is where there is no light field.
+  const bool field = resources.sizes().field.edge != 0;
+  const VkImageView pyramid = field ? resources.pyramid.view() : resources.pool.view();
+  const VkImageView light = field ? resources.field.view() : resources.pool.view();
   const VkImageView views[kCount] = {VK_NULL_HANDLE,
                                      resources.pool.view(),
                                      resources.pool.view(),
@@ -173,7 +183,11 @@ void MetavoxelPipelines::write(const MetavoxelResources& resources, std::uint32_
                                      draw.color,
                                      draw.depth,
                                      scene,
-                                     shadowed ? draw.sceneShadow.view : resources.shadow.view()};
+                                     shadowed ? draw.sceneShadow.view : resources.shadow.view(),
+                                     pyramid,
+                                     pyramid,
+                                     light,
+                                     light};
   VkDescriptorImageInfo images[kCount];
   VkWriteDescriptorSet writes[kCount];
   for (std::uint32_t i = 0; i < kCount; ++i) {

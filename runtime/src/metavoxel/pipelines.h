@@ -27,6 +27,9 @@ enum class MetavoxelPass : std::uint32_t {
   fillVolumeWeighted,
   sum,
   light,
+  inject,
+  pyramid,
+  gather,
   shadow,
   keep,
   spare,
@@ -39,7 +42,7 @@ enum class MetavoxelPass : std::uint32_t {
 
 // Push constants, as shaders/metavoxel.glsl has them.
 struct PassPush {
-  std::uint32_t round = 0, volume = 0, finish = 0, reserved = 0;
+  std::uint32_t round = 0, volume = 0, finish = 0, level = 0;
   std::uint32_t box[4] = {0, 0, 0, 0};
 };
 

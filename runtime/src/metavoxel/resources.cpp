@@ -83,7 +83,7 @@ MetavoxelResources::~MetavoxelResources() {
 std::uint64_t MetavoxelResources::bytes() const {
   std::uint64_t sum = 0;
   for (const Buffer* buffer : {&arrays, &uploads, &counters, &tables_}) sum += buffer->allocationSize();
-  for (const Image* image : {&pool, &cubes, &shadow}) sum += image->allocationSize();
+  for (const Image* image : {&pool, &cubes, &shadow, &pyramid, &field}) sum += image->allocationSize();
   return sum;
 }
 
@@ -112,6 +112,7 @@ void MetavoxelResources::addAddresses(gpu::MetavoxelParams& params) const {
   params.spare = both(r.spare, r.fills);
   params.matter.x = both(r.albedo, 0).x;
   params.matter.y = both(r.albedo, 0).y;
+  params.fieldMatter = both(r.fieldMatter, 0);
 }
 
 Result<void> MetavoxelResources::create(const MetavoxelConfig& config) {
@@ -186,11 +187,31 @@ Result<void> MetavoxelResources::makeAll(const MetavoxelConfig& config, std::uin
       !made) {
     return made;
   }
-  return keep(Image::make(device_, {.format = VK_FORMAT_R32_SFLOAT,
-                                    .extent = {shadowEdge, shadowEdge, 1},
-                                    .type = VK_IMAGE_TYPE_2D,
-                                    .usage = used | VK_IMAGE_USAGE_TRANSFER_SRC_BIT}),
-              shadow);
+  if (auto made = keep(Image::make(device_, {.format = VK_FORMAT_R32_SFLOAT,
+                                             .extent = {shadowEdge, shadowEdge, 1},
+                                             .type = VK_IMAGE_TYPE_2D,
+                                             .usage = used | VK_IMAGE_USAGE_TRANSFER_SRC_BIT}),
+                       shadow);
+      !made) {
+    return made;
+  }
+  return sizes_.field.edge != 0 ? makeField() : Result<void>{};
+}
+
+Result<void> MetavoxelResources::makeField() {
+  const FieldSizes& sizes = sizes_.field;
+  const VkImageUsageFlags used = VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_SAMPLED_BIT;
+  if (auto made = keep(Image::make(device_, {.format = VK_FORMAT_R16G16B16A16_SFLOAT,
+                                             .extent = {sizes.image[0], sizes.image[1], sizes.image[2]},
+                                             .usage = used | VK_IMAGE_USAGE_TRANSFER_DST_BIT}),
+                       pyramid);
+      !made) {
+    return made;
+  }
+  return keep(Image::make(device_, {.format = VK_FORMAT_R16G16B16A16_SFLOAT,
+                                    .extent = {sizes.edge, sizes.edge, sizes.edge},
+                                    .usage = used}),
+              field);
 }
 
 Result<void> MetavoxelResources::bindAll() {
@@ -198,7 +219,8 @@ Result<void> MetavoxelResources::bindAll() {
   for (Buffer* buffer : {&uploads, &counters, &tables_}) {
     if (auto bound = buffer->bind(Placement::mapped); !bound) return bound;
   }
-  for (Image* image : {&pool, &cubes, &shadow}) {
+  for (Image* image : {&pool, &cubes, &shadow, &pyramid, &field}) {
+    if (image->handle() == VK_NULL_HANDLE) continue;
     if (auto bound = image->bind(); !bound) return bound;
   }
   const std::span<std::byte> read = counters.mapped();
@@ -247,12 +269,19 @@ void MetavoxelResources::fillTables(const MetavoxelConfig& config) {
 void MetavoxelResources::recordFirst(VkCommandBuffer commands) const {
   const TableParts parts = tableParts(sizes_);
   const MetavoxelRegions& regions = sizes_.regions;
-  for (const Image* image : {&pool, &shadow}) {
+  for (const Image* image : {&pool, &shadow, &pyramid, &field}) {
+    if (image->handle() == VK_NULL_HANDLE) continue;
     imageBarrier(device_, commands, *image, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_GENERAL);
   }
   imageBarrier(device_, commands, cubes, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
   device_.api.vkCmdFillBuffer(commands, arrays.handle(), 0, regions.particles, 0);
   device_.api.vkCmdFillBuffer(commands, arrays.handle(), regions.blocks, sizes_.blocks() * 4, gpu::kBlockStale);
+  if (pyramid.handle() != VK_NULL_HANDLE) {
+    // Borders stay empty. What lies beyond them is read with a weight of 0, and must be a number.
+    const VkClearColorValue none{};
+    const VkImageSubresourceRange whole{VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+    device_.api.vkCmdClearColorImage(commands, pyramid.handle(), VK_IMAGE_LAYOUT_GENERAL, &none, 1, &whole);
+  }
   const VkBufferCopy copy{parts.materials, regions.materials, parts.cubes};
   device_.api.vkCmdCopyBuffer(commands, tables_.handle(), arrays.handle(), 1, &copy);
   VkBufferImageCopy faces{};

@@ -2,6 +2,8 @@
 #ifndef BILLOW_RUNTIME_METAVOXEL_RESOURCES_H
 #define BILLOW_RUNTIME_METAVOXEL_RESOURCES_H
 
+#include <algorithm>
+
 #include "memory.h"
 #include "sizes.h"
 
@@ -16,7 +18,8 @@ struct MetavoxelUpload {
 };
 
 // At least as large as any device's uniform buffer alignment.
-inline constexpr std::uint64_t kMarchStride = (sizeof(gpu::MarchParams) + 255) / 256 * 256;
+inline constexpr std::uint64_t kMarchStride =
+    (std::max(sizeof(gpu::MarchParams), sizeof(gpu::MetavoxelParams)) + 255) / 256 * 256;
 
 class MetavoxelResources {
  public:
@@ -42,10 +45,12 @@ class MetavoxelResources {
   Buffer uploads;   // MetavoxelUpload for each draw in flight
   Buffer counters;  // MetavoxelCounters for each draw in flight, read by the host
   Image pool, cubes, shadow;
+  Image pyramid, field;  // where there is a light field
   VkSampler sampler = VK_NULL_HANDLE;
 
  private:
   Result<void> makeAll(const MetavoxelConfig& config, std::uint64_t slots);
+  Result<void> makeField();
   Result<void> bindAll();
   Result<void> createSampler();
   void fillTables(const MetavoxelConfig& config);

@@ -29,6 +29,27 @@ void shapeSlots(std::uint64_t slots, std::uint32_t maxImageExtent3D, MetavoxelSi
   sizes.slotsZ = part(slots / (std::uint64_t{sizes.slotsX} * sizes.slotsY), along);
 }
 
+// Level 0 lies at the image's first corner; the others side by side behind it.
+FieldSizes fieldOf(const MetavoxelConfig& config, const MetavoxelSizes& sizes) {
+  FieldSizes field{};
+  if (config.lightField == 0) return field;
+  const std::uint32_t wanted = (sizes.inner + gpu::kFieldVoxel - 1) / gpu::kFieldVoxel;
+  field.perCell = std::min(wanted, config.lightField / sizes.axis);
+  field.edge = field.perCell * sizes.axis;
+  std::uint32_t edge = field.edge, x = 0;
+  // The last one is of 2^3 or fewer; gathering reads the second at least.
+  for (std::uint32_t i = 0; i < gpu::kFieldLevels; ++i, edge = (edge + 1) / 2) {
+    if (i > 1 && field.level[i - 1][3] <= 2) break;
+    field.level[i] = {x + 1, 1, i == 0 ? 1 : field.edge + 3, edge};
+    field.image[0] = std::max(field.image[0], x + edge + 2);
+    if (i > 0) x += edge + 2;
+    field.levels = i + 1;
+  }
+  field.image[1] = field.edge + 2;
+  field.image[2] = field.level[1][2] + field.level[1][3] + 1;
+  return field;
+}
+
 MetavoxelRegions regionsOf(const MetavoxelConfig& config, const MetavoxelSizes& sizes) {
   std::uint64_t end = 0;
   const auto region = [&](std::uint64_t bytes) {
@@ -64,6 +85,8 @@ MetavoxelRegions regionsOf(const MetavoxelConfig& config, const MetavoxelSizes& 
   regions.points = region(pointBytes(tables));
   regions.surfaces = region(bytesOf(tables.surfacePoints));
   regions.columns = region(most * sizes.inner * sizes.inner * 4);
+  const std::uint64_t fieldVoxels = std::uint64_t{sizes.field.perCell} * sizes.field.perCell * sizes.field.perCell;
+  regions.fieldMatter = region(most * fieldVoxels * 16);
   regions.blocks = region(sizes.blocks() * 4);
   regions.volumeWork = region(sizes.blocks() * 8);
   regions.fillWork = region(sizes.blocks() * 16);
@@ -81,6 +104,9 @@ const char* badConfig(const MetavoxelConfig& config) {
   if (config.metavoxels < 1 || config.metavoxels > 128) return "metavoxels";
   if (config.metavoxels * (config.edge - 2) > 4096) return "metavoxels * (edge - 2)";
   if (config.maxMetavoxels < 1 || config.maxMetavoxels > 65535) return "maxMetavoxels";
+  if (config.lightField != 0 && (config.lightField < config.metavoxels || config.lightField > kMostFieldVoxels)) {
+    return "lightField";
+  }
   if (config.maxParticles > 1048576) return "maxParticles";
   if (config.maxVolumes > gpu::kMaxVolumes) return "maxVolumes";
   return config.recordsInFlight == 0 ? "recordsInFlight" : nullptr;
@@ -98,6 +124,7 @@ MetavoxelSizes metavoxelSizes(const MetavoxelConfig& config, std::uint64_t slots
   sizes.rounds = sizes.slots() >= sizes.most ? 1 : (sizes.most + sizes.slots() - 1) / sizes.slots() + 1;
   const std::size_t maps = config.tables != nullptr ? config.tables->maps.size() : 0;
   sizes.cubeLayers = std::max(static_cast<std::uint32_t>(maps) * gpu::kCubeLayers, 1u);
+  sizes.field = fieldOf(config, sizes);
   sizes.regions = regionsOf(config, sizes);
   return sizes;
 }

@@ -11,6 +11,8 @@
 namespace billow::runtime {
 
 inline constexpr std::uint32_t kMostRounds = 256;
+// Along an axis of the light field: its pyramid's image fits into the 256^3 that every device has.
+inline constexpr std::uint32_t kMostFieldVoxels = 160;
 
 // 8 of the pool's image, 4 of emission, and 4 of albedo where metavoxels stay filled.
 inline std::uint64_t texelBytes(const MetavoxelConfig& config) {
@@ -20,9 +22,17 @@ inline std::uint64_t texelBytes(const MetavoxelConfig& config) {
 // Where the arrays of metavoxel_interface.h begin in the device's buffer.
 struct MetavoxelRegions {
   std::uint64_t counters, rounds, words, positions, found, cellAt, lists, cursors, kept, slots, spare, fills, entries,
-      particles, jobs, materials, curves, ramps, emitters, points, surfaces, columns, blocks, volumeWork, fillWork,
-      emission, albedo;
+      particles, jobs, materials, curves, ramps, emitters, points, surfaces, columns, fieldMatter, blocks, volumeWork,
+      fillWork, emission, albedo;
   std::uint64_t bytes;
+};
+
+// The light field, and the pyramid of what shines into it: all levels in one image, each with a border of one texel.
+struct FieldSizes {
+  std::uint32_t edge, perCell;  // voxels along an axis of the space, 0: there is none; along an axis of a cell
+  std::uint32_t levels;
+  std::array<std::array<std::uint32_t, 4>, gpu::kFieldLevels> level;  // first texel, edge
+  std::array<std::uint32_t, 3> image;                                 // texels of the pyramid
 };
 
 struct MetavoxelSizes {
@@ -31,6 +41,7 @@ struct MetavoxelSizes {
   std::uint32_t most;  // occupied cells
   std::uint32_t rounds;
   std::uint32_t cubeLayers;  // of the image of cube maps, at least 1
+  FieldSizes field;
   MetavoxelRegions regions;
 
   std::uint32_t slots() const { return slotsX * slotsY * slotsZ; }

@@ -130,7 +130,8 @@ bool addShadowMap(const Space& space, const SceneShadow& shadow, gpu::MetavoxelP
   return true;
 }
 
-void addPlanes(const Space& space, const MetavoxelDraw& draw, gpu::MetavoxelParams& params) {
+void addPlanes(const Space& space, const MetavoxelDraw& draw, const MetavoxelSizes& sizes,
+               gpu::MetavoxelParams& params) {
   const Vec3d forward = toDouble(draw.view.forward), right = toDouble(draw.view.right), up = toDouble(draw.view.up);
   const double tanHeight = double{draw.view.tanHalfHeight};
   const double tanWidth = tanHeight * draw.width / draw.height;
@@ -146,11 +147,28 @@ void addPlanes(const Space& space, const MetavoxelDraw& draw, gpu::MetavoxelPara
       plane[axis] = dot(inward[i], space.axes[axis]) * space.voxel;
       offset -= plane[axis] * space.half;
     }
+    // With a light field what is not seen lights what is.
+    if (fieldDrawn(draw, sizes)) offset += kUnseenLight * std::sqrt(dot(plane, plane));
     params.planes[i] = vec4(plane, offset);
   }
 }
 
+void addField(const MetavoxelDraw& draw, const MetavoxelSizes& sizes, gpu::MetavoxelParams& params) {
+  const FieldSizes& field = sizes.field;
+  params.field = {field.edge, field.perCell, field.levels, 0};
+  params.fieldScale = {static_cast<float>(sizes.inner) / static_cast<float>(std::max(field.perCell, 1u)),
+                       draw.scattering.surroundings, 0, 0};
+  for (std::size_t i = 0; i < gpu::kFieldLevels; ++i) {
+    const auto at = [&](std::size_t part) { return static_cast<std::int32_t>(field.level[i][part]); };
+    params.levels[i] = {at(0), at(1), at(2), at(3)};
+  }
+}
+
 }  // namespace
+
+bool fieldDrawn(const MetavoxelDraw& draw, const MetavoxelSizes& sizes) {
+  return sizes.field.edge != 0 && draw.scattering.surroundings > 0;
+}
 
 Space spaceOf(const MetavoxelDraw& draw, const MetavoxelSizes& sizes) {
   Space space{};
@@ -205,7 +223,7 @@ std::optional<gpu::MetavoxelParams> paramsOf(const Space& space, const Metavoxel
     params.toWorld[i] = vec4(scaled(space.axes[i], space.voxel), space.half);
   }
   params.eye = vec4(minus(draw.view.eye, space.center), space.voxel);
-  addPlanes(space, draw, params);
+  addPlanes(space, draw, sizes, params);
   params.tint = vec4(toDouble(draw.lightExtinction), 1.0 / sizes.cubeLayers);
   params.texel = vec4(
       {1.0 / (sizes.slotsX * sizes.edge), 1.0 / (sizes.slotsY * sizes.edge), 1.0 / (sizes.slotsZ * sizes.edge)}, 0);
@@ -213,13 +231,14 @@ std::optional<gpu::MetavoxelParams> paramsOf(const Space& space, const Metavoxel
       (draw.cull ? gpu::kFlagCull : 0) | (draw.attenuation == Attenuation::reciprocal ? gpu::kFlagReciprocal : 0) |
       (draw.sceneDepth != VK_NULL_HANDLE ? gpu::kFlagSceneDepth : 0) | (shadowed ? gpu::kFlagShadowMap : 0) |
       (config.keepFilled ? gpu::kFlagKeep : 0) | (draw.refill == Refill::changed ? gpu::kFlagChanged : 0) |
-      (draw.refill == Refill::never ? gpu::kFlagNever : 0);
+      (draw.refill == Refill::never ? gpu::kFlagNever : 0) | (fieldDrawn(draw, sizes) ? gpu::kFlagField : 0);
   params.space = {sizes.axis, sizes.edge, sizes.inner, flags};
   params.pool = {log2Of(sizes.slotsX), log2Of(sizes.slotsY), sizes.slots(), sizes.most};
   params.limits = {static_cast<std::uint32_t>(draw.particles.size()), config.maxListEntries,
                    static_cast<std::uint32_t>(draw.volumes.size()), sizes.rounds};
   params.matter.w = draw.blend == Blend::weighted ? 1 : 0;
   params.picture = {(draw.width + 7) / 8, (draw.height + 7) / 8, number, sizes.cellBits()};
+  addField(draw, sizes, params);
   return params;
 }
 

@@ -32,6 +32,12 @@ struct PlacedVolume {
 };
 std::optional<PlacedVolume> placeVolume(const Space& space, const MetavoxelDraw& draw, const MetavoxelVolume& volume);
 
+// Voxels around what the eye sees in which matter counts for its light.
+inline constexpr double kUnseenLight = 64;
+
+// Whether matter lights matter in this draw.
+bool fieldDrawn(const MetavoxelDraw& draw, const MetavoxelSizes& sizes);
+
 // View, sun and scattering.
 gpu::MarchParams viewOf(const MetavoxelDraw& draw);
 

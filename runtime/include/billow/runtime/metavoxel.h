@@ -31,7 +31,10 @@ struct MetavoxelConfig {
   std::uint32_t maxParticles = 16384;
   std::uint32_t maxListEntries = 1u << 20;  // particles in metavoxels' lists, all together; further ones are left out
   std::uint32_t maxVolumes = 4;             // of a draw, 0 to 8
-  std::uint32_t recordsInFlight = 3;        // record() calls whose commands may be pending at once, at least 1
+  // Voxels along each axis of the space's light field, which Scattering::surroundings needs: `metavoxels` to 160, or 0,
+  // none. They span 8 of the space's voxels or fewer where there is room for so many, else more. Each takes 22 bytes.
+  std::uint32_t lightField = 0;
+  std::uint32_t recordsInFlight = 3;  // record() calls whose commands may be pending at once, at least 1
   bool keepFilled = false;  // metavoxels stay filled from draw to draw, for MetavoxelDraw::refill: 4 bytes more a texel
   // Effects, and materials, curves, ramps, maps and tracks of the particles; kept to the format's rules (those of an
   // open pack are). Read by create() alone. Without them there are no particles.
@@ -60,6 +63,12 @@ struct Scattering {
   float anisotropy = 0.5f;                          // in (-1, 1)
   std::array<float, 3> ambient{0.3f, 0.35f, 0.4f};  // finite
   std::uint32_t orders = 1;                         // as Look::scatteringOrders, 1 to 8
+  // With a light field, matter lights matter: what it emits, and what it scatters of the sun, reaches other matter,
+  // dimmed by what lies between, and is scattered alike in all directions. How much of it counts, in [0, 1]; 0 costs
+  // nothing. What lies further than 64 voxels outside of the view does not count where `cull` is set. `orders` above 1
+  // imitate the same for sunlight: both together count it twice.
+  float surroundings = 1;
+  std::uint32_t bounces = 2;  // how often that light is scattered, 1 to 8
 };
 
 // What is left of sunlight behind a voxel of optical depth d: exp(-d), or 1 / (1 + d).
@@ -123,7 +132,8 @@ struct MetavoxelDraw {
   VkImageView sceneDepth = VK_NULL_HANDLE;  // optional storage image R32F: distance of the scene along `forward`
   SceneShadow sceneShadow = {};
   // Optional: kMetavoxelTimestamps queries of a timestamp pool, reset by the host, from firstTimestamp on: begin,
-  // effects evaluated and binned, first round filled, lit and marched, end.
+  // effects evaluated and binned, first round filled, lit and marched, end. A light field counts
+  // as light.
   VkQueryPool timestamps = VK_NULL_HANDLE;
   std::uint32_t firstTimestamp = 0;
 };
