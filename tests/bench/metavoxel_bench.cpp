@@ -44,6 +44,7 @@ struct Scene {
   std::uint64_t budget;
   bool kept = false;         // only what changed is filled
   std::uint32_t moving = 0;  // of the spheres, from draw to draw
+  std::uint32_t lightField = 0;
 };
 
 constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
@@ -62,6 +63,10 @@ constexpr Scene kScenes[] = {
     {"the same, 10 move", 1000, true, 34, 300, 3072 * kMiB, true, 10},
     {"the same, 100 move", 1000, true, 34, 300, 3072 * kMiB, true, 100},
     {"the same, all move", 1000, true, 34, 300, 3072 * kMiB, true, 1000},
+    {"volume alone, light field", 0, true, 34, 300, 3072 * kMiB, false, 0, 136},
+    {"1000, volume, light field", 1000, true, 34, 300, 3072 * kMiB, false, 0, 136},
+    {"the same, of half as fine", 1000, true, 34, 300, 3072 * kMiB, false, 0, 68},
+    {"the same, 192 MB", 1000, true, 34, 300, 192 * kMiB, false, 0, 68},
 };
 
 Options parse(int argc, char** argv) {
@@ -229,6 +234,7 @@ void measure(headless::Headless& gpu, const format::Pack& pack, const Options& o
                                         .memoryBudget = scene.budget,
                                         .maxMetavoxels = 6144,
                                         .maxListEntries = 1u << 20,
+                                        .lightField = scene.lightField,
                                         .keepFilled = scene.kept,
                                         .tables = &tables};
   const auto metavoxels = valueOf(runtime::Metavoxels::create(*renderer, config));
@@ -262,7 +268,7 @@ void measure(headless::Headless& gpu, const format::Pack& pack, const Options& o
     rows.push_back(valueOf(gpu.time(*renderer, *metavoxels, draw, 1))[0]);
   }
   const runtime::MetavoxelStats stats = metavoxels->stats();
-  fmt::print("{:<24} {:>6} {:>6} {:>6} {:>8} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.1f}\n",
+  fmt::print("{:<26} {:>6} {:>6} {:>6} {:>8} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.1f}\n",
              scene.name, metavoxels->poolSlots(), stats.occupied, stats.filled, stats.listEntries, median(rows, 0, 1),
              median(rows, 1, 2), median(rows, 2, 3), median(rows, 3, 4), median(rows, 4, 5), median(rows, 0, 5),
              static_cast<double>(metavoxels->bytesAllocated()) / 1e6);
@@ -328,7 +334,7 @@ int main(int argc, char** argv) {
   const format::EffectTables tables = dustTables();
   fmt::print("{} on {}, {}x{}, median of {} draws, milliseconds\n", options.pack, gpu->deviceName(), options.width,
              options.height, options.draws);
-  fmt::print("{:<24} {:>6} {:>6} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}\n", "scene", "slots", "occup.",
+  fmt::print("{:<26} {:>6} {:>6} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}\n", "scene", "slots", "occup.",
              "filled", "entries", "bin", "fill", "light", "march", "rounds", "all", "MB");
   for (const Scene& scene : kScenes) measure(*gpu, pack, options, scene, tables);
   return 0;
