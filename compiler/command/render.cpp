@@ -126,7 +126,8 @@ class Painter {
     if (job.request.voxelSize) needs.lattice.edge = *job.request.voxelSize;
     // The other half is for the frames and their staging memory.
     auto metavoxels =
-        MetavoxelPainter::make(*painter.renderer_, job.contents.tables(), needs, job.request.gpuBudget / 2);
+        MetavoxelPainter::make(*painter.renderer_, job.contents.tables(), needs, job.request.gpuBudget / 2,
+                               {job.request.surroundings, job.request.bounces});
     if (!metavoxels) return tl::unexpected(toRefusal(metavoxels.error(), ""));
     painter.metavoxels_ = std::move(*metavoxels);
     return painter;

@@ -196,6 +196,14 @@ void addMethodOptions(CLI::App& command, RenderArguments& arguments) {
       ->check(finite())
       ->check(CLI::Range(0.0, format::kMaxEffectTime));
   command
+      .add_option("--surroundings", arguments.direct.surroundings,
+                  "Of metavoxels: how much of the light that matter gives off and scatters reaches other matter,\n"
+                  "so that fire lights its smoke (default 0; above, --scattering-orders is 1 by default)")
+      ->check(finite())
+      ->check(CLI::Range(0.0, 1.0));
+  command.add_option("--bounces", arguments.direct.bounces, "How often that light is scattered on (default 2)")
+      ->check(CLI::Range(1, 8));
+  command
       .add_option("--voxel-size", arguments.direct.voxelSize,
                   "Of metavoxels, world units (default: the volume's, or a 256th of the effects' size)")
       ->check(finite())
@@ -250,7 +258,14 @@ Checked<void> applyMethod(const RenderArguments& arguments, RenderRequest& reque
   request.method = arguments.method ? (*arguments.method == "direct" ? Method::direct : Method::metavoxel)
                    : needed         ? Method::metavoxel
                                     : Method::direct;
+  request.surroundings = arguments.direct.surroundings;
+  request.bounces = arguments.direct.bounces;
+  // More of them imitate what is now found.
+  if (request.surroundings > 0 && !request.look.scatteringOrders) request.look.scatteringOrders = 1;
   if (request.method == Method::metavoxel) return {};
+  if (request.surroundings > 0) {
+    return refuse(kCommandLine, "--surroundings is drawn by --method metavoxel alone, not by \"direct\"");
+  }
   if (request.effects.empty() && request.volumes.size() == 1 && request.volumes[0].transform == kIdentity) return {};
   const bool one = request.effects.empty() && request.volumes.size() == 1;
   const std::string held =

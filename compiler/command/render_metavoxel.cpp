@@ -39,7 +39,7 @@ void addParticles(const Particles& particles, runtime::WorldBox& box) {
 
 runtime::Result<MetavoxelPainter> MetavoxelPainter::make(runtime::Renderer& renderer,
                                                          const format::EffectTables& tables, const SpaceNeeds& needs,
-                                                         std::uint64_t memoryBudget) {
+                                                         std::uint64_t memoryBudget, Surroundings surroundings) {
   const runtime::WorldBox& box = needs.box;
   double diagonal = 0, longest = 0;
   MetavoxelPainter painter;
@@ -56,6 +56,7 @@ runtime::Result<MetavoxelPainter> MetavoxelPainter::make(runtime::Renderer& rend
   painter.voxelSize_ = static_cast<float>(voxel);
   painter.anchor_ = needs.lattice.anchor;
   painter.mostEntries_ = kMostEntries;
+  painter.surroundings_ = surroundings;
   const double along = std::ceil(diagonal / voxel / kInner) + 1;
   auto made = runtime::Metavoxels::create(
       renderer, {.edge = kEdge,
@@ -65,6 +66,7 @@ runtime::Result<MetavoxelPainter> MetavoxelPainter::make(runtime::Renderer& rend
                  .maxParticles = static_cast<std::uint32_t>(needs.particles),
                  .maxListEntries = kMostEntries,
                  .maxVolumes = needs.volumes,
+                 .lightField = surroundings.share > 0 ? kMostAlong : 0,
                  .recordsInFlight = 1,
                  .tables = &tables});
   if (!made) return tl::unexpected(made.error());
@@ -77,7 +79,8 @@ runtime::Result<headless::Picture> MetavoxelPainter::render(headless::Headless& 
   runtime::MetavoxelDraw info;
   info.view = draw.view;
   info.sun = draw.sun;
-  info.scattering = {draw.look.anisotropy, draw.look.ambient, draw.look.scatteringOrders};
+  info.scattering = {draw.look.anisotropy, draw.look.ambient, draw.look.scatteringOrders, surroundings_.share,
+                     surroundings_.bounces};
   if (draw.quality.shadows == runtime::Filter::none) info.lightExtinction = {0, 0, 0};
   info.center = center_;
   info.anchor = anchor_;

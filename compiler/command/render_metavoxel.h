@@ -30,12 +30,18 @@ struct SpaceNeeds {
   std::uint64_t particles = 0;  // no more than a draw's limit
 };
 
+struct Surroundings {  // as runtime::Scattering has them
+  float share = 0;
+  std::uint32_t bounces = 1;
+};
+
 class MetavoxelPainter {
  public:
   // A space that holds the box from any direction, its voxels those of the lattice or, where that is too fine, larger
   // (edge 0: a 256th of the box).
   static runtime::Result<MetavoxelPainter> make(runtime::Renderer& renderer, const format::EffectTables& tables,
-                                                const SpaceNeeds& needs, std::uint64_t memoryBudget);
+                                                const SpaceNeeds& needs, std::uint64_t memoryBudget,
+                                                Surroundings surroundings);
 
   // `draw` as for the direct method; of its look, how everything scatters. Without shadows light passes unhindered.
   runtime::Result<headless::Picture> render(headless::Headless& gpu, runtime::Renderer& renderer,
@@ -45,6 +51,7 @@ class MetavoxelPainter {
   std::unique_ptr<runtime::Metavoxels> metavoxels_;
   std::array<double, 3> center_{}, anchor_{};
   float voxelSize_ = 0;
+  Surroundings surroundings_;
   std::uint32_t mostEntries_ = 0;
 };
 

@@ -83,6 +83,8 @@ struct RenderRequest {
   Method method = Method::direct;
   std::optional<double> time;       // where no frame is asked for, seconds
   std::optional<double> voxelSize;  // of metavoxels, world units
+  float surroundings = 0;           // of metavoxels, as runtime::Scattering has them
+  std::uint32_t bounces = 2;
   std::int32_t firstFrame = 0, lastFrame = 0;
   bool range = false;
   std::string output;

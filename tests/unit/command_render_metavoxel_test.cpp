@@ -72,13 +72,17 @@ TEST_F(RenderMetavoxel, DrawsVolumesAndEffectsAloneAndTogether) {
   for (const char* what :
        {"--frame 7", "--frame 7 --method metavoxel", "--frame 8 --method metavoxel",
         "--frame 7 --method metavoxel --shadows none", "--frame 8 --effect balls", "--effect balls --time 0.5",
-        "--effect balls --time 2", "--effect balls --time 2 --voxel-size 0.2", "--effect balls --time 2 --sun 1,0,0"}) {
+        "--effect balls --time 2", "--frame 7 --method metavoxel --surroundings 1",
+        "--frame 7 --method metavoxel --surroundings 1 --bounces 5", "--frame 7 --method metavoxel --surroundings 0.5",
+        "--effect balls --time 2 --voxel-size 0.2", "--effect balls --time 2 --sun 1,0,0"}) {
     const std::string drawn = picture(what + camera);
     EXPECT_EQ(drawn.substr(1, 3), "PNG");
     EXPECT_TRUE(pictures.insert(drawn).second) << what << " is like another";
   }
   EXPECT_EQ(picture("--frame 7 --effect balls" + camera), picture("--frame 7 --method metavoxel" + camera))
       << "nothing is alive at the first moment";
+  EXPECT_EQ(picture("--frame 7 --method metavoxel --surroundings 0" + camera),
+            picture("--frame 7 --method metavoxel" + camera));
 }
 
 TEST_F(RenderMetavoxel, RefusesWhatItCannotDo) {
@@ -91,6 +95,10 @@ TEST_F(RenderMetavoxel, RefusesWhatItCannotDo) {
   expectRefused("--effect balls --time -1", "--time");
   expectRefused("--effect balls --time nan", "not a finite number");
   expectRefused("--frame 7 --method metavoxel --voxel-size 0", "--voxel-size");
+  expectRefused("--frame 7 --method metavoxel --surroundings 1.1", "--surroundings");
+  expectRefused("--frame 7 --method metavoxel --surroundings nan", "not a finite number");
+  expectRefused("--frame 7 --method metavoxel --surroundings 1 --bounces 0", "--bounces");
+  expectRefused("--frame 7 --surroundings 1", "direct");
   expectRefused("--frame 7 --method metavoxel --gpu-budget 1MB", "memoryBudget", 4);
 }
 
