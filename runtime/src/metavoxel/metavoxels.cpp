@@ -318,6 +318,10 @@ class MetavoxelsImpl final : public Metavoxels {
       barrier(commands);
     }
     if (field) recordField(commands, draw, steps);
+    if (field && rounds > 1) {  // what there is to fill is counted anew
+      dispatch(commands, steps.plan, {}, {1, 1, 1});
+      barrier(commands);
+    }
     for (std::uint32_t round = 0; round < rounds; ++round) {
       if (!field || rounds > 1) recordFill(commands, draw, steps, round, round == 0 && !field);
       recordLight(commands, draw, steps, {.round = round, .finish = rounds == 1 ? 1u : 0u});
