@@ -279,6 +279,26 @@ TEST_F(MetavoxelField, SmallPoolDrawsTheSamePicture) {
   }
 }
 
+TEST_F(MetavoxelField, MetavoxelsThatStayFilledAreLitAlike) {
+  std::vector<Particle> particles = burningCloud();
+  MetavoxelDraw draw = smallDraw();
+  draw.particles = particles;
+  draw.refill = runtime::Refill::changed;
+  MetavoxelConfig config = fieldConfig();
+  config.keepFilled = true;
+  const auto kept = make(config);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    if (i == 2) particles[4].emission[1] = 9;
+    const headless::Picture picture = render(*kept, draw);
+    EXPECT_EQ(kept->stats().filled == 0, i == 1);
+    MetavoxelDraw anew = draw;
+    anew.refill = runtime::Refill::always;
+    const headless::Picture expected = renderOnce(fieldConfig(), anew);
+    EXPECT_LT(largestDifference(picture, expected), 5e-3f) << i;
+    EXPECT_GT(pictureDecibels(picture, expected), 55) << i;
+  }
+}
+
 TEST_F(MetavoxelField, WhatIsBesideTheViewLightsWhatIsInIt) {
   // The ball is 30 voxels outside of a view of a mote; a second draw has forgotten the first.
   const std::vector<Particle> particles{glowing(ball({-3.5f, 0, 0}, 0.6f, 0.2f, kHard), 5),
