@@ -231,7 +231,8 @@ TEST_F(MetavoxelField, OffIsWithout) {
   const headless::Picture with = renderOnce(fieldConfig(), draw);
   EXPECT_GT(largestDifference(without, with), 0.05f);
   draw.scattering.surroundings = 0;
-  EXPECT_EQ(largestDifference(without, renderOnce(fieldConfig(), draw)), 0);
+  // Two draws place metavoxels differently in the pool: the filter rounds otherwise.
+  EXPECT_LT(largestDifference(without, renderOnce(fieldConfig(), draw)), 1e-4f);
 }
 
 TEST_F(MetavoxelField, DoesNotDependOnHowTheSpaceIsCut) {
