@@ -5,6 +5,7 @@
 #include "metavoxel.glsl"
 
 layout(set = 1, binding = 8) uniform texture2D sceneShadow;
+layout(constant_id = 7) const bool kSceneShadow = true;  // there is one
 
 const float kNoCaster = 1e30;
 const uint kMostCasters = 16u;
@@ -49,7 +50,7 @@ float casterAt(vec2 voxel) {
 
 // For the column of voxels whose middle is at `voxel`.
 void findCasters(vec2 voxel) {
-  if (!hasFlag(kFlagShadowMap)) return;
+  if (!kSceneShadow) return;
   const uint along = uint(meta.mapAt.w);
   casterCount = along * along;
   casterSpan = vec2(kNoCaster, -kNoCaster);
@@ -61,7 +62,7 @@ void findCasters(vec2 voxel) {
 
 // Share of the column's voxel about z that the sun shines on, were nothing but the scene in its way.
 float sunnyShare(float z) {
-  if (z + 0.5 <= casterSpan.x) return 1.0;
+  if (!kSceneShadow || z + 0.5 <= casterSpan.x) return 1.0;
   if (z - 0.5 >= casterSpan.y) return 0.0;
   float sum = 0.0;
   for (uint i = 0u; i < casterCount; ++i) sum += clamp(casters[i] - (z - 0.5), 0.0, 1.0);

@@ -10,6 +10,7 @@
 
 layout(set = 1, binding = 10) uniform sampler3D pyramid;
 layout(set = 1, binding = 12) uniform sampler3D fieldLight;
+layout(constant_id = 8) const bool kField = true;  // there is one
 
 // What a voxel of the field holds on average, per voxel edge of the space.
 struct FieldMatter {
@@ -45,7 +46,7 @@ vec4 readLevel(uint level, vec3 at) {
 
 // Radiance that arrives at a voxel from the matter around it, the mean over all directions.
 vec3 surroundingsAt(vec3 voxel) {
-  if (!hasFlag(kFlagField)) return vec3(0.0);
+  if (!kField || !hasFlag(kFlagField)) return vec3(0.0);
   const float scale = 1.0 / float(cellsAxis() * innerVoxels());
   return textureLod(fieldLight, voxel * scale, 0.0).rgb * meta.fieldScale.y;
 }

@@ -35,7 +35,6 @@ BILLOW_GPU_CONST kFieldLevels = 8u;      // of its pyramid, at most
 BILLOW_GPU_CONST kFlagCull = 1u;        // cells that neither the eye sees nor light passes on its way to what it sees
 BILLOW_GPU_CONST kFlagReciprocal = 2u;  // 1 / (1 + d) in place of exp(-d)
 BILLOW_GPU_CONST kFlagSceneDepth = 4u;  // rays end at the scene
-BILLOW_GPU_CONST kFlagShadowMap = 8u;   // light ends at the scene
 BILLOW_GPU_CONST kFlagKeep = 16u;       // metavoxels stay filled, and of those only
 BILLOW_GPU_CONST kFlagChanged = 32u;    // the changed ones are filled anew
 BILLOW_GPU_CONST kFlagNever = 64u;      // none

@@ -14,15 +14,15 @@ using Code = std::span<const std::uint32_t>;
 
 // In the order of MetavoxelPass.
 Code codeOf(MetavoxelPass pass) {
-  static const Code codes[] = {spirv::kMetavoxelClear,      spirv::kMetavoxelReset,       spirv::kMetavoxelSpawn,
-                               spirv::kMetavoxelBin,        spirv::kMetavoxelBin,         spirv::kMetavoxelBinVolume,
-                               spirv::kMetavoxelPlan,       spirv::kMetavoxelRank,        spirv::kMetavoxelBlocks,
-                               spirv::kMetavoxelFill,       spirv::kMetavoxelFillVolume,  spirv::kMetavoxelFill,
-                               spirv::kMetavoxelFillVolume, spirv::kMetavoxelSum,         spirv::kMetavoxelLight,
-                               spirv::kMetavoxelInject,     spirv::kMetavoxelPyramid,     spirv::kMetavoxelGather,
-                               spirv::kMetavoxelShadow,     spirv::kMetavoxelKeep,        spirv::kMetavoxelSpare,
-                               spirv::kMetavoxelCompare,    spirv::kMetavoxelMarchHalf,   spirv::kMetavoxelMarchSingle,
-                               spirv::kMetavoxelFinishHalf, spirv::kMetavoxelFinishSingle};
+  static const Code codes[] = {
+      spirv::kMetavoxelClear,       spirv::kMetavoxelReset,      spirv::kMetavoxelSpawn,
+      spirv::kMetavoxelBin,         spirv::kMetavoxelBin,        spirv::kMetavoxelBinVolume,
+      spirv::kMetavoxelPlan,        spirv::kMetavoxelRank,       spirv::kMetavoxelBlocks,
+      spirv::kMetavoxelFill,        spirv::kMetavoxelFillVolume, spirv::kMetavoxelSum,
+      spirv::kMetavoxelLight,       spirv::kMetavoxelInject,     spirv::kMetavoxelPyramid,
+      spirv::kMetavoxelGather,      spirv::kMetavoxelShadow,     spirv::kMetavoxelKeep,
+      spirv::kMetavoxelSpare,       spirv::kMetavoxelCompare,    spirv::kMetavoxelMarchHalf,
+      spirv::kMetavoxelMarchSingle, spirv::kMetavoxelFinishHalf, spirv::kMetavoxelFinishSingle};
   return codes[static_cast<std::size_t>(pass)];
 }
 
@@ -149,16 +149,24 @@ Result<void> MetavoxelPipelines::createSets() {
   return {};
 }
 
-Result<VkPipeline> MetavoxelPipelines::pipeline(MetavoxelPass pass, const FrameIndices& indices) {
+Result<VkPipeline> MetavoxelPipelines::pipeline(MetavoxelPass pass, PassVariant variant, const FrameIndices& indices) {
+  using enum MetavoxelPass;
+  variant.weighted = variant.weighted && (pass == fill || pass == fillVolume);
+  variant.sceneShadow = variant.sceneShadow && (pass == light || pass == inject || pass == MetavoxelPass::shadow);
   const PassKey grids = passKey(indices, Shader::voxels, Filter::trilinear, Filter::none);
-  const Key key{pass, grids.index, grids.grids};
+  const Key key{pass, grids.index, grids.grids, variant.weighted || variant.sceneShadow};
   // The place first, so that no pipeline is lost where there is no memory for it.
   VkPipeline& place = pipelines_[key];
   if (place != VK_NULL_HANDLE) return place;
-  const bool weighted = pass == MetavoxelPass::fillWeighted || pass == MetavoxelPass::fillVolumeWeighted;
-  const std::uint32_t constants[] = {
-      grids.index, gpu::kFilterTrilinear, gpu::kFilterNone, grids.grids, pass == MetavoxelPass::binWrite ? 1u : 0u,
-      uses_,       weighted ? 1u : 0u};
+  const std::uint32_t constants[] = {grids.index,
+                                     gpu::kFilterTrilinear,
+                                     gpu::kFilterNone,
+                                     grids.grids,
+                                     pass == binWrite ? 1u : 0u,
+                                     uses_,
+                                     variant.weighted ? 1u : 0u,
+                                     variant.sceneShadow ? 1u : 0u,
+                                     field_ ? 1u : 0u};
   auto made = makeComputePipeline(device_, layout_, codeOf(pass), constants);
   if (made) place = *made;
   return made;

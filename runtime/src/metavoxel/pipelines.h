@@ -23,8 +23,6 @@ enum class MetavoxelPass : std::uint32_t {
   blocks,
   fill,
   fillVolume,
-  fillWeighted,
-  fillVolumeWeighted,
   sum,
   light,
   inject,
@@ -40,6 +38,12 @@ enum class MetavoxelPass : std::uint32_t {
   finishSingle,
 };
 
+// What a draw may ask of passes: those that it concerns are made once with it and once without.
+struct PassVariant {
+  bool weighted = false;     // Blend::weighted
+  bool sceneShadow = false;  // there is a shadow map
+};
+
 // Push constants, as shaders/metavoxel.glsl has them.
 struct PassPush {
   std::uint32_t round = 0, volume = 0, finish = 0, level = 0;
@@ -52,14 +56,15 @@ class MetavoxelPipelines {
       : device_(device),
         inFlight_(config.recordsInFlight),
         volumes_(config.maxVolumes),
-        uses_(config.tables != nullptr ? usesOf(config.tables->materials) : 0) {}
+        uses_(config.tables != nullptr ? usesOf(config.tables->materials) : 0),
+        field_(config.lightField != 0) {}
   MetavoxelPipelines(const MetavoxelPipelines&) = delete;
   MetavoxelPipelines& operator=(const MetavoxelPipelines&) = delete;
   ~MetavoxelPipelines();
 
   Result<void> create();
   // The passes of one volume are made for the grids and indices of its frame; others have none.
-  Result<VkPipeline> pipeline(MetavoxelPass pass, const FrameIndices& indices = {});
+  Result<VkPipeline> pipeline(MetavoxelPass pass, PassVariant variant, const FrameIndices& indices = {});
 
   // Writes the sets of one draw in flight.
   void write(const MetavoxelResources& resources, std::uint32_t inFlight, const MetavoxelDraw& draw);
@@ -70,7 +75,7 @@ class MetavoxelPipelines {
 
  private:
   static std::uint32_t usesOf(std::span<const format::ParticleMaterial> materials);  // gpu::kUse...
-  using Key = std::tuple<MetavoxelPass, std::uint32_t, std::uint32_t>;               // pass, index kind, grids
+  using Key = std::tuple<MetavoxelPass, std::uint32_t, std::uint32_t, bool>;         // pass, index kind, grids, variant
   Result<void> createLayouts();
   Result<void> createSets();
   void bind(VkCommandBuffer commands, VkDescriptorSet first, VkDescriptorSet second) const;
@@ -82,6 +87,7 @@ class MetavoxelPipelines {
   std::uint32_t inFlight_;
   std::uint32_t volumes_;
   std::uint32_t uses_;
+  bool field_;
   VkDescriptorSetLayout matterLayout_ = VK_NULL_HANDLE;  // MarchParams and a volume's atlas
   VkDescriptorSetLayout spaceLayout_ = VK_NULL_HANDLE;   // MetavoxelParams and all images
   VkPipelineLayout layout_ = VK_NULL_HANDLE;

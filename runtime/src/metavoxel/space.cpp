@@ -229,9 +229,9 @@ std::optional<gpu::MetavoxelParams> paramsOf(const Space& space, const Metavoxel
       {1.0 / (sizes.slotsX * sizes.edge), 1.0 / (sizes.slotsY * sizes.edge), 1.0 / (sizes.slotsZ * sizes.edge)}, 0);
   const std::uint32_t flags =
       (draw.cull ? gpu::kFlagCull : 0) | (draw.attenuation == Attenuation::reciprocal ? gpu::kFlagReciprocal : 0) |
-      (draw.sceneDepth != VK_NULL_HANDLE ? gpu::kFlagSceneDepth : 0) | (shadowed ? gpu::kFlagShadowMap : 0) |
-      (config.keepFilled ? gpu::kFlagKeep : 0) | (draw.refill == Refill::changed ? gpu::kFlagChanged : 0) |
-      (draw.refill == Refill::never ? gpu::kFlagNever : 0) | (fieldDrawn(draw, sizes) ? gpu::kFlagField : 0);
+      (draw.sceneDepth != VK_NULL_HANDLE ? gpu::kFlagSceneDepth : 0) | (config.keepFilled ? gpu::kFlagKeep : 0) |
+      (draw.refill == Refill::changed ? gpu::kFlagChanged : 0) | (draw.refill == Refill::never ? gpu::kFlagNever : 0) |
+      (fieldDrawn(draw, sizes) ? gpu::kFlagField : 0);
   params.space = {sizes.axis, sizes.edge, sizes.inner, flags};
   params.pool = {log2Of(sizes.slotsX), log2Of(sizes.slotsY), sizes.slots(), sizes.most};
   params.limits = {static_cast<std::uint32_t>(draw.particles.size()), config.maxListEntries,
