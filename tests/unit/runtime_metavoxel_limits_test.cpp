@@ -46,7 +46,7 @@ TEST_F(MetavoxelLimits, ConfigOutsideOfItsRangeIsRefused) {
 
 TEST_F(MetavoxelLimits, BudgetIsKeptAndGivenBack) {
   const std::uint64_t before = renderer_->bytesInUse();
-  for (const std::uint64_t budget : {1'500'000, 3'000'000, 20'000'000}) {
+  for (const std::uint64_t budget : {2'000'000, 3'000'000, 20'000'000}) {
     MetavoxelConfig config = smallConfig();
     config.memoryBudget = budget;
     const auto metavoxels = make(config);
