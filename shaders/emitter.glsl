@@ -8,9 +8,11 @@
 
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Emitters { EmitterRecord items[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Spawns { SpawnJob items[]; };
+layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer GivenParticles { GivenParticle items[]; };
 
 struct Motion {
   vec3 place, velocity;
+  float radius;  // factor
 };
 
 struct Birth {
@@ -141,6 +143,7 @@ vec3 ownVelocity(EmitterRecord emitter, float runShare, float samplesPerSecond) 
 
 Motion setOut(EmitterRecord emitter, uint seed, float runShare, float samplesPerSecond) {
   Motion motion;
+  motion.radius = 1.0;
   motion.place = rowsAt(emitter.positionRow, runShare, 0.0) + placeInShape(emitter, seed);
   const vec3 cone = coneDirection(emitter.spreadCosine, draw(seed, kDrawDirection), draw(seed, kDrawDirection + 1u));
   const bool outward = (emitter.flags & kEmitterNormal) != 0u;
@@ -157,11 +160,12 @@ Motion closedForm(EmitterRecord emitter, Birth birth) {
   const vec3 pull = vectorOf(emitter.gravity) + emitter.drag * vectorOf(emitter.wind);
   const vec3 start = birth.motion.velocity;
   const vec3 way = (start * mean + pull * birth.age * decayMeanSlope(decayed)) * birth.age;
-  return Motion(birth.motion.place + way, start * exp(-decayed) + pull * birth.age * mean);
+  return Motion(birth.motion.place + way, start * exp(-decayed) + pull * birth.age * mean, 1.0);
 }
 
-// Where a particle is in a frame of a track: its points are sorted by number, which comes before the place.
-bool pointIn(uvec2 frame, uint number, out vec3 place) {
+// Where a particle is in a frame of a track, and the factor of its radius there: the points are sorted by number, which
+// comes before the place.
+bool pointIn(uvec2 frame, uint number, out vec4 placeAndRadius) {
   QuadArray points = QuadArray(meta.emitters.zw);
   uint low = frame.x, high = frame.x + frame.y;
   while (low < high) {
@@ -174,20 +178,26 @@ bool pointIn(uvec2 frame, uint number, out vec3 place) {
   }
   if (low == frame.x + frame.y) return false;
   const uvec4 point = points.items[low];
-  place = uintBitsToFloat(point.yzw);
+  const float radius = meta.radii.z == 0u ? 1.0 : Floats(meta.radii.xy).items[low];
+  placeAndRadius = vec4(uintBitsToFloat(point.yzw), radius);
   return point.x == number;
 }
 
-// On the straight line between two frames, the first of which may be the birth.
+// On the straight line between two frames, the first of which may be the birth. Given particles rest before their first
+// frame and after their last.
 Motion sampled(EmitterRecord emitter, SpawnJob job, Birth birth) {
-  vec3 before, after;
+  vec4 before, after;
   const bool first = pointIn(job.points.xy, birth.number, before), second = pointIn(job.points.zw, birth.number, after);
-  const vec3 from = first ? before - vectorOf(emitter.position) : birth.motion.place;
-  if (!second) return Motion(from, vec3(0.0));
+  const vec4 middle = vec4(vectorOf(emitter.position), 0.0);
+  const vec4 from = first ? before - middle : vec4(birth.motion.place, 1.0);
+  if (!second) return Motion(from.xyz, vec3(0.0), from.w);
+  if (!first && emitter.givenCount != 0u) return Motion(after.xyz - middle.xyz, vec3(0.0), after.w);
   const float gone = first ? job.moments.x : birth.age;
   const float whole = gone + job.moments.y;
-  const vec3 way = after - vectorOf(emitter.position) - from;
-  return whole > 0.0 ? Motion(from + way * (gone / whole), way / whole) : Motion(from, vec3(0.0));
+  if (!(whole > 0.0)) return Motion(from.xyz, vec3(0.0), from.w);
+  const vec4 way = after - middle - from;
+  const vec4 at = from + way * (gone / whole);
+  return Motion(at.xyz, way.xyz / whole, at.w);
 }
 
 // ---- Look
@@ -215,9 +225,9 @@ void fillMaps(EmitterRecord emitter, uint seed, float age, inout Particle partic
   particle.map = (emitter.firstMap + index) | (emitter.firstMap + (index + 1u) % emitter.mapCount) << 16;
 }
 
-// `scale` is that of the effect in the world.
-void fillLook(EmitterRecord emitter, uint seed, float share, float scale, inout Particle particle) {
-  const float radius = between(seed, kDrawRadius, emitter.radius) * rowAt(emitter.radiusRow, share, 1.0);
+// `factor` is one of the radius, `scale` that of the effect in the world.
+void fillLook(EmitterRecord emitter, uint seed, float share, float factor, float scale, inout Particle particle) {
+  const float radius = between(seed, kDrawRadius, emitter.radius) * factor * rowAt(emitter.radiusRow, share, 1.0);
   particle.radius = max(radius, 0.0) * scale;
   particle.extinction = emitter.extinction * max(rowAt(emitter.opacityRow, share, 1.0), 0.0) / scale;
   particle.shape = vectorOf(emitter.proportions) * particle.radius;
@@ -229,9 +239,51 @@ void fillLook(EmitterRecord emitter, uint seed, float share, float scale, inout 
   particle.seed = seed;
 }
 
+Particle particleAt(EmitterRecord emitter, SpawnJob job, uint seed, Motion motion, float age, float share) {
+  Particle particle;
+  particle.center = job.origin.xyz + job.origin.w * rotated(job.turn, motion.place);
+  particle.rotation = product(job.turn, rotationOf(emitter, seed, share, motion.velocity));
+  fillLook(emitter, seed, share, motion.radius, job.origin.w, particle);
+  fillMaps(emitter, seed, age, particle);
+  return particle;
+}
+
+// And what is lost to rounding (Knuth).
+vec2 exactDifference(float a, float b) {
+  precise const float difference = a - b;
+  precise const float part = difference - a;
+  precise const float rest = (a - (difference - part)) - (b + part);
+  return vec2(difference, rest);
+}
+
+// Its end is found to the last digit: in a loop all end and begin anew in one moment.
+Particle givenParticle(EmitterRecord emitter, SpawnJob job, uint i) {
+  GivenParticles rows = GivenParticles(meta.surfaces.zw);
+  const uint at = emitter.firstGiven + job.numbers.z;
+  const GivenParticle given = rows.items[at + i];
+  Birth birth;
+  birth.number = job.numbers.z + i;
+  const vec2 later = exactDifference(given.time, rows.items[at].time);
+  const vec2 age = exactDifference(job.times.x, later.x);
+  precise const float rest = age.y + (job.times.y - later.y);
+  precise const float left = given.lifetime - age.x - rest;
+  birth.age = max(age.x + rest, 0.0);  // the host left out those not yet born
+  birth.motion.place = -vectorOf(emitter.position);
+  Particle particle;
+  particle.radius = 0.0;
+  if (!(left > 0.0)) return particle;
+  Motion motion = sampled(emitter, job, birth);
+  motion.radius *= given.radius;
+  const float share = min((given.age + birth.age) / given.life, 1.0);
+  particle = particleAt(emitter, job, hashInteger(job.numbers.w + given.id), motion, birth.age, share);
+  particle.diffuse *= vectorOf(given.colour);
+  return particle;
+}
+
 // The job's i-th candidate, relative to the space's centre; its radius is 0 where it is not alive.
 Particle particleOf(SpawnJob job, uint i) {
   const EmitterRecord emitter = Emitters(meta.emitters.xy).items[job.numbers.y];
+  if (emitter.givenCount != 0u) return givenParticle(emitter, job, i);
   const uint seed = hashInteger(job.numbers.w + job.numbers.z + i);
   const float slot = float(i) + draw(seed, kDrawBirth);
   const float lifetime = between(seed, kDrawLifetime, emitter.lifetime);
@@ -249,12 +301,7 @@ Particle particleOf(SpawnJob job, uint i) {
   } else {
     motion = sampled(emitter, job, birth);
   }
-  const float share = birth.age / lifetime;
-  particle.center = job.origin.xyz + job.origin.w * rotated(job.turn, motion.place);
-  particle.rotation = product(job.turn, rotationOf(emitter, seed, share, motion.velocity));
-  fillLook(emitter, seed, share, job.origin.w, particle);
-  fillMaps(emitter, seed, birth.age, particle);
-  return particle;
+  return particleAt(emitter, job, seed, motion, birth.age, birth.age / lifetime);
 }
 
 #endif

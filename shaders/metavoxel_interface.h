@@ -71,7 +71,8 @@ struct MetavoxelCounters {
 BILLOW_GPU_SIZE(MetavoxelCounters, 112);
 
 // Candidates of one span in one run of an effect's emitter, as the effect lies in the world. A candidate's slot is its
-// number here plus a random one in [0, 1).
+// number here plus a random one in [0, 1). Of given particles (GivenParticle), numbers.z is that of the first
+// candidate in the run, and times.x its age, to which times.y adds what is lost to rounding.
 struct SpawnJob {
   uvec4 numbers;  // of its first particle in the draw; emitter; the first candidate's among all runs; emitter's hash
   vec4 times;     // age of one born at slot 0, seconds a slot; its birth as a share of the duration, the same a slot
@@ -105,7 +106,8 @@ struct MetavoxelParams {
   uvec4 work;      // addresses: work items of volumes; of particles (metavoxel_work.glsl)
   uvec4 emitters;  // addresses: emitters; points of tracks
   uvec4 spawn;     // address of jobs; their number; candidates, the last of the particles
-  uvec4 surfaces;  // address of the points of meshes; unused
+  uvec4 surfaces;  // addresses: points of meshes; given particles
+  uvec4 radii;     // address of radii, one a point of a track; 1 where there are any, else all are 1
   uvec4 kept;      // addresses: a cell's last slot + 1; slots
   uvec4 spare;     // addresses: slots to give away; slots to fill
   uvec4 matter;    // address: albedo of each texel (RGB9E5) where they are kept; hash of the space; 1: weighted blend
@@ -119,7 +121,7 @@ struct MetavoxelParams {
   uvec4 fieldMatter;           // address: what its voxels hold, by position; 0, 0
   ivec4 levels[kFieldLevels];  // of the pyramid: first texel in its image, edge
 };
-BILLOW_GPU_SIZE(MetavoxelParams, 51 * 16);
+BILLOW_GPU_SIZE(MetavoxelParams, 52 * 16);
 
 #ifdef __cplusplus
 }  // namespace billow::runtime::gpu

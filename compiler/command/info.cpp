@@ -87,7 +87,8 @@ constexpr std::pair<const char*, std::uint64_t format::EffectGpuBytes::*> kEffec
     {"materials", &format::EffectGpuBytes::materials}, {"curves", &format::EffectGpuBytes::curves},
     {"ramps", &format::EffectGpuBytes::ramps},         {"maps", &format::EffectGpuBytes::maps},
     {"surfaces", &format::EffectGpuBytes::surfaces},   {"emitters", &format::EffectGpuBytes::emitters},
-    {"tracks", &format::EffectGpuBytes::tracks},       {"particles", &format::EffectGpuBytes::particles}};
+    {"given", &format::EffectGpuBytes::given},         {"tracks", &format::EffectGpuBytes::tracks},
+    {"particles", &format::EffectGpuBytes::particles}};
 
 Json toJson(const PackSummary& pack) {
   Json json;

@@ -61,8 +61,8 @@ EffectSummary summariseEffect(const format::Pack& pack, const format::EffectReco
   for (std::uint32_t e = 0; e < effect.emitterCount; ++e) {
     const format::EmitterRecord& emitter = tables.emitters[effect.firstEmitter + e];
     const auto spans = std::span(tables.spans).subspan(emitter.firstSpan, emitter.spanCount);
-    summary.emitters.push_back({std::string(pack.string(emitter.name)), spans.back().first + spans.back().count,
-                                format::mostAlive(emitter, spans, effect.duration, summary.loop)});
+    const std::uint64_t born = spans.empty() ? emitter.givenCount : spans.back().first + spans.back().count;
+    summary.emitters.push_back({std::string(pack.string(emitter.name)), born, format::mostAlive(tables, effect, e)});
   }
   return summary;
 }

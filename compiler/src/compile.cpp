@@ -23,7 +23,12 @@ void refuseToReplaceInputs(const Plan& plan, const std::string& output) {
   for (const PlannedVolume& volume : plan.volumes) {
     for (const PlannedFrame& frame : volume.frames) std::for_each(frame.files.begin(), frame.files.end(), check);
   }
-  for (const EffectDescription& effect : plan.effects) check(effect.file);
+  for (const EffectDescription& effect : plan.effects) {
+    check(effect.file);
+    for (const EmitterDescription& emitter : effect.emitters) {
+      if (emitter.given) std::for_each(emitter.given->files.begin(), emitter.given->files.end(), check);
+    }
+  }
 }
 
 std::unique_ptr<WritePass> writeAtQuality(const std::string& output, const CompileOptions& options, const Plan& plan,

@@ -8,6 +8,8 @@
 namespace billow::format {
 namespace {
 
+constexpr double kSlack = 1e-6;  // seconds; far above what rounding may move
+
 // At most so many of a span's particles are born in [from, to].
 std::uint64_t bornWithin(const SpawnSpan& span, double from, double to) {
   const double begin = static_cast<double>(span.begin), end = static_cast<double>(span.end);
@@ -29,6 +31,16 @@ std::pair<std::uint32_t, std::uint32_t> candidatesOf(const SpawnSpan& span, doub
   };
   const std::uint32_t first = index(oldest);
   return {first - std::min(first, 1u), std::min(index(youngest) + 1, span.count)};
+}
+
+// Which of given particles, which are in order of their births.
+std::pair<std::uint32_t, std::uint32_t> candidatesOf(std::span<const GivenParticle> given, double longestLife,
+                                                     double now) {
+  const auto bornBefore = [](const GivenParticle& one, double time) { return static_cast<double>(one.time) < time; };
+  const auto notAfter = [](double time, const GivenParticle& one) { return time < static_cast<double>(one.time); };
+  const auto first = std::lower_bound(given.begin(), given.end(), now - longestLife, bornBefore);
+  const auto last = std::upper_bound(given.begin(), given.end(), now, notAfter);
+  return {static_cast<std::uint32_t>(first - given.begin()), static_cast<std::uint32_t>(last - given.begin())};
 }
 
 // The first and last run in which an emitter's particles may be alive.
@@ -56,6 +68,10 @@ std::vector<Candidates> candidatesAt(const EffectTables& tables, std::uint32_t e
             candidatesOf(tables.spans[emitter.firstSpan + s], static_cast<double>(emitter.lifetime[1]), now);
         if (first < last) all.push_back({e, s, run, first, last});
       }
+      if (emitter.givenCount == 0) continue;
+      const auto given = std::span(tables.given).subspan(emitter.firstGiven, emitter.givenCount);
+      const auto [first, last] = candidatesOf(given, static_cast<double>(emitter.lifetime[1]), now);
+      if (first < last) all.push_back({e, 0, run, first, last});
     }
   }
   return all;
@@ -64,8 +80,8 @@ std::vector<Candidates> candidatesAt(const EffectTables& tables, std::uint32_t e
 std::uint64_t effectBytes(const EffectTables& tables) {
   const auto bytes = [](const auto& records) { return std::as_bytes(std::span(records)).size(); };
   return bytes(tables.tracks) + bytes(tables.trackFrames) + bytes(tables.trackBytes) + bytes(tables.effects) +
-         bytes(tables.emitters) + bytes(tables.spans) + bytes(tables.materials) + bytes(tables.curves) +
-         bytes(tables.ramps) + bytes(tables.maps) + bytes(tables.surfacePoints);
+         bytes(tables.emitters) + bytes(tables.spans) + bytes(tables.given) + bytes(tables.materials) +
+         bytes(tables.curves) + bytes(tables.ramps) + bytes(tables.maps) + bytes(tables.surfacePoints);
 }
 
 float sampleCurve(const CurveRow& row, float x) {
@@ -77,7 +93,6 @@ float sampleCurve(const CurveRow& row, float x) {
 // The number born within a window changes its slope only where the window's ends meet those of a span, so it is largest
 // with the window's end at one of these.
 std::uint64_t mostAlive(const EmitterRecord& emitter, std::span<const SpawnSpan> spans, float duration, bool loop) {
-  constexpr double kSlack = 1e-6;  // seconds; far above what rounding may move
   const double life = static_cast<double>(emitter.lifetime[1]), period = static_cast<double>(duration);
   const double runs = loop ? std::floor(life / period) : 0;
   const double window = life - runs * period;
@@ -101,13 +116,45 @@ std::uint64_t mostAlive(const EmitterRecord& emitter, std::span<const SpawnSpan>
   return most + total * static_cast<std::uint64_t>(runs);
 }
 
+// In a loop, what lives on into later runs is alive beside the particles of these: whole runs count for themselves, and
+// the rest of a life is folded back into the run.
+std::uint64_t mostAlive(std::span<const GivenParticle> given, float duration, bool loop) {
+  const double period = static_cast<double>(duration);
+  std::uint64_t always = 0;
+  std::vector<double> begins, ends;
+  const auto add = [&](double begin, double end) {
+    begins.push_back(begin - kSlack);
+    ends.push_back(end + kSlack);
+  };
+  for (const GivenParticle& particle : given) {
+    const double time = static_cast<double>(particle.time), life = static_cast<double>(particle.lifetime);
+    const double runs = loop ? std::floor(life / period) : 0;
+    always += static_cast<std::uint64_t>(runs);
+    const double end = time + life - runs * period;
+    add(time, end);
+    if (loop && end + kSlack >= period) add(time - period, end - period);
+  }
+  std::sort(begins.begin(), begins.end());
+  std::sort(ends.begin(), ends.end());
+  std::size_t ended = 0, most = 0;
+  for (std::size_t begun = 1; begun <= begins.size(); ++begun) {
+    while (ends[ended] < begins[begun - 1]) ++ended;
+    most = std::max(most, begun - ended);
+  }
+  return always + most;
+}
+
+std::uint64_t mostAlive(const EffectTables& tables, const EffectRecord& effect, std::uint32_t emitter) {
+  const EmitterRecord& record = tables.emitters[effect.firstEmitter + emitter];
+  const bool loop = (effect.flags & kEffectLoop) != 0;
+  const auto spans = std::span(tables.spans).subspan(record.firstSpan, record.spanCount);
+  const auto given = std::span(tables.given).subspan(record.firstGiven, record.givenCount);
+  return given.empty() ? mostAlive(record, spans, effect.duration, loop) : mostAlive(given, effect.duration, loop);
+}
+
 std::uint64_t mostAlive(const EffectTables& tables, const EffectRecord& effect) {
   std::uint64_t sum = 0;
-  for (std::uint32_t i = 0; i < effect.emitterCount; ++i) {
-    const EmitterRecord& emitter = tables.emitters[effect.firstEmitter + i];
-    const auto spans = std::span(tables.spans).subspan(emitter.firstSpan, emitter.spanCount);
-    sum += mostAlive(emitter, spans, effect.duration, (effect.flags & kEffectLoop) != 0);
-  }
+  for (std::uint32_t i = 0; i < effect.emitterCount; ++i) sum += mostAlive(tables, effect, i);
   return sum;
 }
 

@@ -107,18 +107,40 @@ class EffectRules {
       const EmitterRecord& emitter = tables_.emitters[i];
       const bool follows = emitter.firstSpan == spans;
       spans += emitter.spanCount;
-      if (follows && emitter.spanCount >= 1 && emitter.spanCount <= kMaxSpans && spans <= tables_.spans.size()) {
-        continue;
-      }
+      const bool number =
+          emitter.givenCount > 0 ? emitter.spanCount == 0 : emitter.spanCount >= 1 && emitter.spanCount <= kMaxSpans;
+      if (follows && number && spans <= tables_.spans.size()) continue;
       sink_.report(Rule::effectRanges, placeOf<EmitterRecord>(kSectionEmitters, i),
                    fmt::format("Its {} spans from {} do not.", emitter.spanCount, emitter.firstSpan));
       return false;
     }
-    if (emitters == tables_.emitters.size() && spans == tables_.spans.size()) return true;
+    if (emitters == tables_.emitters.size() && spans == tables_.spans.size()) return checkGivenRanges();
     sink_.report(Rule::effectRanges, placeOf<EffectRecord>(kSectionEffects, 0),
                  fmt::format("Effects own {} of {} emitters, these {} of {} spans.", emitters, tables_.emitters.size(),
                              spans, tables_.spans.size()));
     return false;
+  }
+
+  bool checkGivenRanges() {
+    std::uint64_t given = 0;
+    for (std::size_t i = 0; i < tables_.emitters.size(); ++i) {
+      const EmitterRecord& emitter = tables_.emitters[i];
+      const bool follows = emitter.firstGiven == (emitter.givenCount > 0 ? given : 0);
+      given += emitter.givenCount;
+      const bool moved = emitter.givenCount > 0 ? emitter.track != kNoTrack : !hasRadii(emitter);
+      if (follows && moved && emitter.givenCount <= kMaxCycleParticles && given <= tables_.given.size()) continue;
+      sink_.report(Rule::givenRanges, placeOf<EmitterRecord>(kSectionEmitters, i),
+                   fmt::format("{} from {}, with track {}.", emitter.givenCount, emitter.firstGiven, emitter.track));
+      return false;
+    }
+    if (given == tables_.given.size()) return true;
+    sink_.report(Rule::givenRanges, placeOf<GivenParticle>(kSectionGiven, 0),
+                 fmt::format("The emitters own {} of {}.", given, tables_.given.size()));
+    return false;
+  }
+
+  bool hasRadii(const EmitterRecord& emitter) const {
+    return emitter.track < tables_.tracks.size() && (tables_.tracks[emitter.track].flags & kTrackRadii) != 0;
   }
 
   void checkEffect(std::uint32_t number, std::set<std::string_view>& names) {
@@ -149,7 +171,9 @@ class EffectRules {
   bool checkEmitter(std::size_t number, const EffectRecord& effect) {
     const EmitterRecord& emitter = tables_.emitters[number];
     const Place place = placeOf<EmitterRecord>(kSectionEmitters, number);
-    if (!allZero(emitter.reserved)) sink_.report(Rule::tableReserved, place, "A reserved field of an emitter is not.");
+    if (!allZero(emitter.reserved)) {
+      sink_.report(Rule::tableReserved, place, "A reserved field of an emitter is not.");
+    }
     checkMotion(emitter, place);
     checkLook(emitter, place);
     checkReferences(emitter, place);
@@ -158,7 +182,7 @@ class EffectRules {
       sink_.report(Rule::emitterValues, place,
                    fmt::format("Lifetime {} to {} s.", emitter.lifetime[0], emitter.lifetime[1]));
     }
-    return checkSpans(emitter, effect) && lifetime;
+    return checkSpans(emitter, effect) && checkGiven(emitter, effect) && lifetime;
   }
 
   void require(bool holds, std::string_view what, const Place& place) {
@@ -240,6 +264,28 @@ class EffectRules {
       sink_.report(
           Rule::emitterSpans, placeOf<SpawnSpan>(kSectionSpans, index),
           fmt::format("{} particles from {} between {} and {} s.", span.count, span.first, span.begin, span.end));
+      return false;
+    }
+    return true;
+  }
+
+  bool checkGiven(const EmitterRecord& emitter, const EffectRecord& effect) {
+    float before = 0;
+    for (std::uint32_t i = 0; i < emitter.givenCount; ++i) {
+      const std::size_t index = std::size_t{emitter.firstGiven} + i;
+      const GivenParticle& given = tables_.given[index];
+      const Place place = placeOf<GivenParticle>(kSectionGiven, index);
+      const bool times = within(given.time, before, effect.duration) && given.lifetime > 0 &&
+                         given.lifetime <= emitter.lifetime[1] && given.life > 0;
+      before = given.time;
+      const bool look = within(given.age, 0, kMaxMagnitude) && within(given.life, 0, kMaxMagnitude) &&
+                        within(given.radius, 0, kMaxMagnitude) && allWithin(given.colour, 0, 1);
+      if (given.reserved != 0) sink_.report(Rule::tableReserved, place, "A reserved field of a particle is not.");
+      if (times && look) continue;
+      sink_.report(
+          Rule::givenValues, place,
+          fmt::format("Born at {} s for {} s, {} of {} s old, radius {}, colour {} {} {}.", given.time, given.lifetime,
+                      given.age, given.life, given.radius, given.colour[0], given.colour[1], given.colour[2]));
       return false;
     }
     return true;

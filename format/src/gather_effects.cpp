@@ -46,6 +46,11 @@ EmitterRecord GatheredEffects::moveEmitter(const EffectTables& source, Moved& mo
   const auto spans = std::span(source.spans).subspan(emitter.firstSpan, emitter.spanCount);
   record.firstSpan = static_cast<std::uint32_t>(tables_.spans.size());
   tables_.spans.insert(tables_.spans.end(), spans.begin(), spans.end());
+  if (emitter.givenCount != 0) {
+    const auto given = std::span(source.given).subspan(emitter.firstGiven, emitter.givenCount);
+    record.firstGiven = static_cast<std::uint32_t>(tables_.given.size());
+    tables_.given.insert(tables_.given.end(), given.begin(), given.end());
+  }
   for (std::uint32_t* row : {&record.positionRow, &record.diffuseRow, &record.emissionRow}) {
     *row = take(source.curves, *row, 3, moved.curves, tables_.curves);
   }
@@ -87,6 +92,7 @@ std::uint32_t GatheredEffects::addTrack(const EffectTables& source, Moved& moved
     tables_.trackBytes.insert(tables_.trackBytes.end(), bytes.begin(), bytes.end());
     tables_.trackFrames.push_back(frame);
     tables_.trackPoints.push_back(source.trackPoints[f]);
+    tables_.trackRadii.push_back(source.trackRadii[f]);
   }
   return place;
 }

@@ -60,7 +60,7 @@ std::uint64_t packGpuBytes(std::span<const GridFrame> gridFrames,
 }
 
 std::uint64_t EffectGpuBytes::total() const {
-  return materials + curves + ramps + maps + surfaces + emitters + tracks + particles;
+  return materials + curves + ramps + maps + surfaces + emitters + given + tracks + particles;
 }
 
 EffectGpuBytes effectGpuBytes(const EffectTables& tables) {
@@ -72,7 +72,9 @@ EffectGpuBytes effectGpuBytes(const EffectTables& tables) {
   bytes.maps = tables.maps.size() * kGpuCubeBytes;
   bytes.surfaces = bytesOf(tables.surfacePoints);
   bytes.emitters = bytesOf(tables.emitters);
-  for (const TrackFrame& frame : tables.trackFrames) bytes.tracks += std::uint64_t{frame.count} * sizeof(TrackPoint);
+  bytes.given = bytesOf(tables.given);
+  const std::uint64_t pointBytes = sizeof(TrackPoint) + (haveRadii(tables.tracks) ? sizeof(float) : 0);
+  for (const TrackFrame& frame : tables.trackFrames) bytes.tracks += frame.count * pointBytes;
   for (const EffectRecord& effect : tables.effects) bytes.particles += mostAlive(tables, effect) * sizeof(Particle);
   return bytes;
 }

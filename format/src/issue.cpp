@@ -137,7 +137,7 @@ constexpr IssueKind kCatalogue[] = {
 
     error(Rule::effectRanges, "effect-ranges",
           "The effects divide the emitters among themselves, at most 64 each, and the emitters the spans, 1 to 128 "
-          "each, in order and without remainder."),
+          "each, none with given particles, in order and without remainder."),
     error(Rule::effectValues, "effect-values",
           "An effect has no reserved flags, is warm from the start only if it loops, and lasts from 0.01 to 3600 s."),
     error(Rule::effectAlive, "effect-alive", "No more than 65536 particles of an effect can be alive at once."),
@@ -155,6 +155,11 @@ constexpr IssueKind kCatalogue[] = {
           "The tracks divide their frames, and these the bytes, in order and without remainder, within their limits."),
     error(Rule::trackData, "track-data",
           "A track's frame is a Draco point cloud of so many points, in order of their numbers, at finite places."),
+    error(Rule::givenRanges, "given-ranges",
+          "The emitters divide the given particles among themselves, at most 1048576 each, in order and without "
+          "remainder; those with any have a track, and only those one with radii."),
+    error(Rule::givenValues, "given-values",
+          "Given particles are in order of birth, within their effect's duration, and their numbers are in range."),
     error(Rule::emitterSurface, "emitter-surface",
           "An emitter on a mesh has 1 to 65536 surface points, which exist; any other has none."),
 };

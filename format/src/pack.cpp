@@ -62,6 +62,7 @@ void readEffects(const ByteSource& source, std::span<const SectionEntry> section
   readTable(source, sections, kSectionCurves, effects.curves, sink);
   readTable(source, sections, kSectionRamps, effects.ramps, sink);
   readTable(source, sections, kSectionCubes, effects.maps, sink);
+  readTable(source, sections, kSectionGiven, effects.given, sink);
   readTable(source, sections, kSectionTracks, effects.tracks, sink);
   readTable(source, sections, kSectionTrackFrames, effects.trackFrames, sink);
   readTable(source, sections, kSectionTrackBytes, effects.trackBytes, sink);

@@ -84,6 +84,7 @@ class EmitterRun {
       : tables_(tables),
         emitter_(tables.emitters[effect.firstEmitter + number]),
         spans_(std::span(tables.spans).subspan(emitter_.firstSpan, emitter_.spanCount)),
+        given_(std::span(tables.given).subspan(emitter_.firstGiven, emitter_.givenCount)),
         duration_(static_cast<double>(effect.duration)),
         seed_(effect.seed),
         number_(number),
@@ -92,6 +93,7 @@ class EmitterRun {
   // Those of the candidates that are alive.
   void append(const Candidates& candidates, std::vector<Particle>& into) const {
     const double now = time_ - static_cast<double>(candidates.run) * duration_;
+    if (!given_.empty()) return appendGiven(candidates, now, into);
     const std::uint32_t total = spans_.empty() ? 0 : spans_.back().first + spans_.back().count;
     // With a track, all runs are alike.
     const std::uint32_t run = emitter_.track == kNoTrack ? static_cast<std::uint32_t>(candidates.run) : 0;
@@ -106,6 +108,7 @@ class EmitterRun {
 
   std::vector<Birth> births() const {
     std::vector<Birth> all;
+    for (std::uint32_t i = 0; i < given_.size(); ++i) all.push_back(givenBirth(i));
     for (const SpawnSpan& span : spans_) {
       for (std::uint32_t i = 0; i < span.count; ++i) {
         const Dice dice(seed_, number_, span.first + i);
@@ -117,6 +120,17 @@ class EmitterRun {
   }
 
  private:
+  Birth givenBirth(std::uint32_t i) const {
+    return {i, static_cast<double>(given_[i].time), static_cast<double>(given_[i].lifetime), {}, {}};
+  }
+  void appendGiven(const Candidates& candidates, double now, std::vector<Particle>& into) const {
+    for (std::uint32_t i = candidates.first; i < candidates.last; ++i) {
+      const Birth birth = givenBirth(i);
+      const double age = now - birth.time;
+      if (age >= 0 && age < birth.lifetime) into.push_back(givenParticle(given_[i], birth, age));
+    }
+  }
+
   // All of it but place and velocity.
   Birth birthOf(const Dice& dice, const SpawnSpan& span, std::uint32_t i) const {
     const double share = (i + dice.draw(kDrawBirth)) / span.count;
@@ -220,10 +234,11 @@ class EmitterRun {
 
   struct Motion {
     Vec3 place, velocity;
+    double radius;  // factor
   };
 
   Motion closedForm(const Birth& birth, double age) const {
-    Motion motion{};
+    Motion motion{{}, {}, 1};
     const double drag = static_cast<double>(emitter_.drag);
     const double mean = decayMean(drag * age), slope = decayMeanSlope(drag * age), left = decay(drag * age);
     for (std::size_t i = 0; i < 3; ++i) {
@@ -234,48 +249,75 @@ class EmitterRun {
     return motion;
   }
 
-  const TrackPoint* findPoint(const TrackRecord& track, double frame, std::uint32_t number) const {
-    if (!(frame < track.frameCount)) return nullptr;
-    const auto& points = tables_.trackPoints[track.firstFrame + static_cast<std::size_t>(frame)];
-    const auto found = std::lower_bound(points.begin(), points.end(), number,
-                                        [](const TrackPoint& point, std::uint32_t n) { return point.number < n; });
-    return found != points.end() && found->number == number ? &*found : nullptr;
+  struct FramePoint {
+    bool found;
+    Vec3 place;
+    double radius;
+  };
+  FramePoint pointIn(const TrackRecord& track, double frame, std::uint32_t number) const {
+    if (!(frame < track.frameCount)) return {};
+    const std::size_t index = track.firstFrame + static_cast<std::size_t>(frame);
+    const auto& points = tables_.trackPoints[index];
+    const auto point = std::lower_bound(points.begin(), points.end(), number,
+                                        [](const TrackPoint& one, std::uint32_t n) { return one.number < n; });
+    if (point == points.end() || point->number != number) return {};
+    const auto& radii = tables_.trackRadii[index];
+    const double radius =
+        radii.empty() ? 1 : static_cast<double>(radii[static_cast<std::size_t>(point - points.begin())]);
+    return {true, vec(point->position), radius};
   }
 
-  // On the straight line between two frames, the first of which may be the birth.
+  // On the straight line between two frames, the first of which may be the birth. Given particles rest before their
+  // first frame and after their last.
   Motion sampled(const Birth& birth, double age) const {
     const TrackRecord& track = tables_.tracks[emitter_.track];
     const double rate = static_cast<double>(track.framesPerSecond), now = birth.time + age;
-    const double frame = std::floor(now * rate);
-    const TrackPoint* before = findPoint(track, frame, birth.number);
-    const TrackPoint* after = findPoint(track, frame + 1, birth.number);
-    Motion motion{before != nullptr ? vec(before->position) : birth.position, {}};
-    if (after == nullptr) return motion;
-    const double begin = before != nullptr ? frame / rate : birth.time;
+    const double last = given_.empty() ? track.frameCount : track.frameCount - 1.0;
+    const double frame = std::min(std::floor(now * rate), last);
+    const FramePoint before = pointIn(track, frame, birth.number), after = pointIn(track, frame + 1, birth.number);
+    Motion motion{before.found ? before.place : birth.position, {}, before.found ? before.radius : 1};
+    if (!after.found) return motion;
+    if (!before.found && !given_.empty()) return {after.place, {}, after.radius};
+    const double begin = before.found ? frame / rate : birth.time;
     const double length = (frame + 1) / rate - begin;
-    const Vec3 end = vec(after->position);
-    for (std::size_t i = 0; i < 3 && length > 0; ++i) {
-      motion.velocity[i] = (end[i] - motion.place[i]) / length;
+    if (!(length > 0)) return motion;
+    const double share = (now - begin) / length;
+    for (std::size_t i = 0; i < 3; ++i) {
+      motion.velocity[i] = (after.place[i] - motion.place[i]) / length;
       motion.place[i] += motion.velocity[i] * (now - begin);
     }
+    motion.radius += (after.radius - motion.radius) * share;
     return motion;
   }
 
   Particle particle(const Dice& dice, Birth birth, double age) const {
     setOut(dice, birth);
     const Motion motion = emitter_.track == kNoTrack ? closedForm(birth, age) : sampled(birth, age);
-    const double share = age / birth.lifetime;
+    return particle(dice, motion, age, age / birth.lifetime);
+  }
+
+  Particle givenParticle(const GivenParticle& given, const Birth& birth, double age) const {
+    const double share = (static_cast<double>(given.age) + age) / static_cast<double>(given.life);
+    Motion motion = sampled(birth, age);
+    motion.radius *= static_cast<double>(given.radius);
+    Particle result = particle(Dice(seed_, number_, given.id), motion, age, std::min(share, 1.0));
+    for (std::size_t i = 0; i < 3; ++i) result.diffuse[i] *= given.colour[i];
+    return result;
+  }
+
+  // `share` of its life.
+  Particle particle(const Dice& dice, const Motion& motion, double age, double share) const {
     Particle result{};
     for (std::size_t i = 0; i < 3; ++i) result.center[i] = static_cast<float>(motion.place[i]);
     const Quaternion turn = rotation(dice, share, motion.velocity);
     for (std::size_t i = 0; i < 4; ++i) result.rotation[i] = static_cast<float>(turn[i]);
-    fillLook(dice, share, result);
+    fillLook(dice, share, motion.radius, result);
     fillMaps(dice, age, result);
     return result;
   }
 
-  void fillLook(const Dice& dice, double share, Particle& result) const {
-    const double radius = dice.between(kDrawRadius, emitter_.radius) * row(emitter_.radiusRow, share, 1);
+  void fillLook(const Dice& dice, double share, double factor, Particle& result) const {
+    const double radius = dice.between(kDrawRadius, emitter_.radius) * factor * row(emitter_.radiusRow, share, 1);
     const double opacity = row(emitter_.opacityRow, share, 1);
     result.radius = static_cast<float>(std::max(0.0, radius));
     result.extinction = static_cast<float>(static_cast<double>(emitter_.extinction) * std::max(0.0, opacity));
@@ -298,6 +340,7 @@ class EmitterRun {
   const EffectTables& tables_;
   const EmitterRecord& emitter_;
   std::span<const SpawnSpan> spans_;
+  std::span<const GivenParticle> given_;
   double duration_;
   std::uint32_t seed_;
   std::uint32_t number_;

@@ -37,6 +37,7 @@ constexpr SectionKind kSectionKinds[] = {
     {"CURV", kSectionCurves, 0},
     {"RAMP", kSectionRamps, 0},
     {"CUBE", kSectionCubes, 0},
+    {"GIVN", kSectionGiven, 0},
     {"TRCK", kSectionTracks, 0},
     {"TRFR", kSectionTrackFrames, 0},
     {"TRPT", kSectionTrackBytes, 0},

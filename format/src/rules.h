@@ -128,6 +128,8 @@ enum class Rule : std::uint16_t {
   effectTable = 709,
   trackRanges = 710,
   trackData = 711,
+  givenRanges = 712,
+  givenValues = 713,
   emitterSurface = 714,
 };
 

@@ -10,7 +10,10 @@ namespace {
 
 constexpr float kFarthest = 1e9f;
 
-bool soundPoints(std::span<const TrackPoint> points) {
+bool soundPoints(std::span<const TrackPoint> points, std::span<const float> radii) {
+  for (const float radius : radii) {
+    if (!(radius >= 0 && radius <= kMaxTrackRadius)) return false;
+  }
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (i > 0 && points[i].number <= points[i - 1].number) return false;
     for (const float coordinate : points[i].position) {
@@ -52,7 +55,7 @@ bool checkTracks(const TableView& view, IssueSink& sink) {
     frames += track.frameCount;
     const bool rate = track.framesPerSecond >= kMinTrackRate && track.framesPerSecond <= kMaxTrackRate;
     if (follows && rate && track.frameCount >= 1 && track.frameCount <= kMaxTrackFrames &&
-        frames <= tables.trackFrames.size() && track.reserved == 0) {
+        frames <= tables.trackFrames.size() && (track.flags & ~kTrackRadii) == 0) {
       continue;
     }
     sink.report(
@@ -68,13 +71,22 @@ bool checkTracks(const TableView& view, IssueSink& sink) {
 
 void loadTracks(const TableView& view, EffectTables& tables, IssueSink& sink) {
   tables.trackPoints.resize(tables.trackFrames.size());
-  for (std::size_t i = 0; i < tables.trackFrames.size() && !sink.stopped(); ++i) {
-    const TrackFrame& frame = tables.trackFrames[i];
-    const auto bytes = std::span(tables.trackBytes).subspan(frame.offset, frame.size);
-    if (decodeTrackFrame(bytes, frame.count, tables.trackPoints[i]) && soundPoints(tables.trackPoints[i])) continue;
-    tables.trackPoints[i].clear();
-    sink.report(Rule::trackData, view.place(kSectionTrackBytes, frame.offset),
-                fmt::format("Frame {} of {} points in {} bytes.", i, frame.count, frame.size));
+  tables.trackRadii.resize(tables.trackFrames.size());
+  for (const TrackRecord& track : tables.tracks) {
+    const bool hasRadii = (track.flags & kTrackRadii) != 0;
+    for (std::uint32_t f = 0; f < track.frameCount && !sink.stopped(); ++f) {
+      const std::size_t i = std::size_t{track.firstFrame} + f;
+      const TrackFrame& frame = tables.trackFrames[i];
+      const auto bytes = std::span(tables.trackBytes).subspan(frame.offset, frame.size);
+      if (decodeTrackFrame(bytes, frame.count, hasRadii, tables.trackPoints[i], tables.trackRadii[i]) &&
+          soundPoints(tables.trackPoints[i], tables.trackRadii[i])) {
+        continue;
+      }
+      tables.trackPoints[i].clear();
+      tables.trackRadii[i].clear();
+      sink.report(Rule::trackData, view.place(kSectionTrackBytes, frame.offset),
+                  fmt::format("Frame {} of {} points in {} bytes.", i, frame.count, frame.size));
+    }
   }
 }
 

@@ -16,7 +16,7 @@ namespace billow::format {
 namespace {
 
 constexpr std::uint32_t kMostSections = 9;
-constexpr std::uint32_t kEffectSections = 10;
+constexpr std::uint32_t kEffectSections = 12;
 
 constexpr std::uint64_t aligned(std::uint64_t offset) {
   return (offset + kSectionAlignment - 1) / kSectionAlignment * kSectionAlignment;
@@ -140,6 +140,7 @@ void PackWriter::Impl::writeEffects(const EffectTables& effects) {
   write(kSectionCurves, effects.curves);
   write(kSectionRamps, effects.ramps);
   write(kSectionCubes, effects.maps);
+  write(kSectionGiven, effects.given);
   write(kSectionTracks, effects.tracks);
   write(kSectionTrackFrames, effects.trackFrames);
   write(kSectionTrackBytes, effects.trackBytes);

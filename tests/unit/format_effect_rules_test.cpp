@@ -23,12 +23,14 @@ namespace {
 using namespace format;
 using tests::packTables;
 
-std::vector<std::byte> trackFrame(const std::vector<TrackPoint>& points) {
+std::vector<std::byte> trackFrame(const std::vector<TrackPoint>& points, const std::vector<float>& radii = {}) {
   draco::PointCloudBuilder builder;
   builder.Start(static_cast<std::uint32_t>(points.size()));
   const int position = builder.AddAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32);
   const int number = builder.AddAttribute(draco::GeometryAttribute::GENERIC, 1, draco::DT_UINT32);
+  const int radius = radii.empty() ? -1 : builder.AddAttribute(draco::GeometryAttribute::GENERIC, 1, draco::DT_FLOAT32);
   for (std::uint32_t i = 0; i < points.size(); ++i) {
+    if (!radii.empty()) builder.SetAttributeValueForPoint(radius, draco::PointIndex(i), &radii[i]);
     builder.SetAttributeValueForPoint(position, draco::PointIndex(i), points[i].position);
     builder.SetAttributeValueForPoint(number, draco::PointIndex(i), &points[i].number);
   }
@@ -40,6 +42,37 @@ std::vector<std::byte> trackFrame(const std::vector<TrackPoint>& points) {
   EXPECT_TRUE(encoder.EncodeToBuffer(&buffer).ok());
   const auto* first = reinterpret_cast<const std::byte*>(buffer.data());
   return {first, first + buffer.size()};
+}
+
+void addFrame(EffectTables& tables, const std::vector<TrackPoint>& points, const std::vector<float>& radii) {
+  const std::vector<std::byte> bytes = points.empty() ? std::vector<std::byte>() : trackFrame(points, radii);
+  tables.trackFrames.push_back(
+      {tables.trackBytes.size(), static_cast<std::uint32_t>(bytes.size()), static_cast<std::uint32_t>(points.size())});
+  tables.trackBytes.insert(tables.trackBytes.end(), bytes.begin(), bytes.end());
+}
+
+// The last frame again, with other radii.
+void replaceLastFrame(EffectTables& tables, const std::vector<float>& radii) {
+  tables.trackBytes.resize(tables.trackFrames.back().offset);
+  tables.trackFrames.pop_back();
+  addFrame(tables, {{0, {1, 2, 3}}, {1, {4, 5, 6}}}, radii);
+}
+
+// An emitter of two given particles.
+void addGiven(EffectTables& tables) {
+  EmitterRecord emitter = tests::plainEmitter();
+  emitter.firstSpan = static_cast<std::uint32_t>(tables.spans.size());
+  emitter.spanCount = 0;
+  emitter.givenCount = 2;
+  emitter.track = static_cast<std::uint32_t>(tables.tracks.size());
+  ++tables.effects.back().emitterCount;
+  tables.emitters.push_back(emitter);
+  tables.given.push_back({0.25f, 0.5f, 0, 1, 1, {1, 1, 1}, 17, 0});
+  tables.given.push_back({0.5f, 2, 0.5f, 4, 3, {1, 0.5f, 0}, 5, 0});
+  tables.tracks.push_back({static_cast<std::uint32_t>(tables.trackFrames.size()), 3, 4, kTrackRadii});
+  addFrame(tables, {}, {});
+  addFrame(tables, {{0, {0, 2, 3}}}, {1});
+  addFrame(tables, {{0, {1, 2, 3}}, {1, {4, 5, 6}}}, {0.5f, 1});
 }
 
 // Two effects that use everything there is.
@@ -77,15 +110,14 @@ EffectTables fullEffects() {
   for (std::uint32_t f = 0; f < 3; ++f) {
     std::vector<TrackPoint> points;
     for (std::uint32_t i = 0; i < 3; ++i) points.push_back({i * 2, {static_cast<float>(f + i), 1, 2}});
-    const std::vector<std::byte> bytes = trackFrame(points);
-    tables.trackFrames.push_back({tables.trackBytes.size(), static_cast<std::uint32_t>(bytes.size()), 3});
-    tables.trackBytes.insert(tables.trackBytes.end(), bytes.begin(), bytes.end());
+    addFrame(tables, points, {});
   }
   tables.emitters[0].shape = static_cast<std::uint32_t>(EmitterShape::mesh);
   tables.emitters[0].flags = kEmitterNormal;
   std::fill_n(tables.emitters[0].extent, 3, 2.0f);
   tables.emitters[0].pointCount = 3;
   tables.surfacePoints = {{{0, 0, 0}, {0, 0}}, {{32767, -32767, -32768}, {127, -128}}, {{1, 2, 3}, {-100, 90}}};
+  addGiven(tables);
   for (CurveRow& row : tables.curves) std::fill_n(row.values, kCurveSamples, 0.5f);
   return tables;
 }
@@ -132,9 +164,13 @@ TEST(EffectRules, SoundOnesComeBackAsTheyWere) {
   EXPECT_TRUE(same(pack->effects().tracks, tables.tracks));
   EXPECT_TRUE(same(pack->effects().trackFrames, tables.trackFrames));
   EXPECT_TRUE(same(pack->effects().surfacePoints, tables.surfacePoints));
-  ASSERT_EQ(pack->effects().trackPoints.size(), 3u);
+  ASSERT_EQ(pack->effects().trackPoints.size(), 6u);
   EXPECT_EQ(pack->effects().trackPoints[1][2].number, 4u);
   EXPECT_NEAR(pack->effects().trackPoints[1][2].position[0], 3, 1e-3f);
+  EXPECT_TRUE(same(pack->effects().given, tables.given));
+  ASSERT_EQ(pack->effects().trackRadii.size(), 6u);
+  EXPECT_TRUE(pack->effects().trackRadii[2].empty());
+  EXPECT_EQ(pack->effects().trackRadii[5], (std::vector<float>{0.5f, 1}));
   EXPECT_EQ(pack->string(pack->effects().effects[1].name), "effect 1");
   EXPECT_FALSE(particlesAt(pack->effects(), 1, 0.9).empty());
 }
@@ -148,7 +184,7 @@ TEST(EffectRules, EveryBrokenRuleIsTold) {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   const std::vector<Fault> faults = {
       {701, [](EffectTables& t) { t.effects[1].firstEmitter = 0; }},
-      {701, [](EffectTables& t) { t.effects[1].emitterCount = 2; }},
+      {701, [](EffectTables& t) { t.effects[1].emitterCount = 3; }},
       {701, [](EffectTables& t) { t.effects[1].emitterCount = 0xffffffff; }},
       {701, [](EffectTables& t) { t.effects.pop_back(); }},
       {701, [](EffectTables& t) { t.emitters[0].spanCount = 0; }},
@@ -206,11 +242,11 @@ TEST(EffectRules, EveryBrokenRuleIsTold) {
       {708, [](EffectTables& t) { t.materials[0].occlusion = -1; }},
       {709, [](EffectTables& t) { t.curves[0].values[63] = kNan; }},
       {709, [](EffectTables& t) { t.ramps[0].values[15][31][3] = -1; }},
-      {706, [](EffectTables& t) { t.emitters[0].track = 1; }},
+      {706, [](EffectTables& t) { t.emitters[0].track = 2; }},
       {710, [](EffectTables& t) { t.tracks[0].frameCount = 2; }},
       {710, [](EffectTables& t) { t.tracks[0].framesPerSecond = kNan; }},
-      {710, [](EffectTables& t) { t.tracks[0].reserved = 1; }},
-      {710, [](EffectTables& t) { t.tracks.clear(), t.emitters[1].track = kNoTrack; }},
+      {710, [](EffectTables& t) { t.tracks[0].flags = 2; }},
+      {710, [](EffectTables& t) { t.tracks.pop_back(), t.emitters[2].track = 0; }},
       {710, [](EffectTables& t) { t.trackFrames[1].offset = 1; }},
       {710, [](EffectTables& t) { t.trackFrames[0].count = kMaxTrackPoints + 1; }},
       {710, [](EffectTables& t) { t.trackBytes.push_back({}); }},
@@ -225,13 +261,46 @@ TEST(EffectRules, EveryBrokenRuleIsTold) {
       {714, [](EffectTables& t) { t.emitters[1].firstPoint = 1; }},
       {714, [](EffectTables& t) { t.emitters[1].pointCount = 1; }},
       {215, [](EffectTables& t) { t.effects[0].reserved[4] = 1; }},
-      {215, [](EffectTables& t) { t.emitters[0].reserved[4] = 1; }},
+      {215, [](EffectTables& t) { t.emitters[0].reserved[2] = 1; }},
+      {215, [](EffectTables& t) { t.given[1].reserved = 1; }},
+      {701,
+       [](EffectTables& t) {
+         t.emitters[2].spanCount = 1, t.spans.push_back({0, 1, 0, 1});
+       }},
+      {701, [](EffectTables& t) { t.emitters[2].givenCount = 0, t.given.clear(); }},
+      {711, [](EffectTables& t) { t.tracks[1].flags = 0; }},
+      {712, [](EffectTables& t) { t.emitters[1].track = 1; }},  // radii that it has no particles for
+      {711,
+       [](EffectTables& t) {
+         replaceLastFrame(t, {2.5f, 1});
+       }},
+      {711,
+       [](EffectTables& t) {
+         replaceLastFrame(t, {-1, 1});
+       }},
+      {711, [](EffectTables& t) { replaceLastFrame(t, {}); }},
+      {712, [](EffectTables& t) { t.emitters[2].track = kNoTrack; }},
+      {712, [](EffectTables& t) { t.emitters[2].firstGiven = 1; }},
+      {712, [](EffectTables& t) { t.emitters[2].givenCount = 3; }},
+      {712, [](EffectTables& t) { t.emitters[2].givenCount = 0xffffffff; }},
+      {712, [](EffectTables& t) { t.emitters[0].firstGiven = 1; }},
+      {712, [](EffectTables& t) { t.given.emplace_back(); }},
+      {713, [](EffectTables& t) { t.given[1].time = 0.1f; }},
+      {713, [](EffectTables& t) { t.given[1].time = 1.5f; }},
+      {713, [](EffectTables& t) { t.given[0].time = kNan; }},
+      {713, [](EffectTables& t) { t.given[0].lifetime = 0; }},
+      {713, [](EffectTables& t) { t.given[0].lifetime = 3; }},
+      {713, [](EffectTables& t) { t.given[0].age = -1; }},
+      {713, [](EffectTables& t) { t.given[0].life = 0; }},
+      {713, [](EffectTables& t) { t.given[0].radius = kNan; }},
+      {713, [](EffectTables& t) { t.given[0].colour[2] = 2; }},
   };
   for (std::size_t i = 0; i < faults.size(); ++i) {
     EffectTables tables = fullEffects();
     faults[i].change(tables);
     const std::vector<std::byte> bytes = packBytes(tables);
-    const std::vector<int> ids = issueIds(bytes);
+    std::vector<int> ids = issueIds(bytes);
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());  // of several frames each may tell
     EXPECT_EQ(ids, std::vector<int>{faults[i].rule}) << "fault " << i;
     const Result<Pack> pack = Pack::open(makeMemorySource(bytes));
     ASSERT_FALSE(pack) << "fault " << i;
@@ -268,7 +337,7 @@ TEST(EffectRules, WhatOpensDoesNoHarm) {
   int opened = 0;
   for (int round = 0; round < 4000; ++round) {
     std::vector<std::byte> bytes = sound;
-    constexpr std::size_t kSections[] = {8, 9, 10, 11, 12, 15, 16, 17, 17, 18};  // without ramps and maps
+    constexpr std::size_t kSections[] = {8, 9, 10, 11, 12, 15, 15, 16, 17, 18, 18, 19};  // without ramps and maps
     const SectionEntry& section = pack->sections()[kSections[random() % std::size(kSections)]];
     for (int i = 0; i < 1 + round % 3; ++i) {
       bytes[section.offset + random() % section.size] = static_cast<std::byte>(random() & 255);

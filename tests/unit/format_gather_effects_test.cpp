@@ -70,7 +70,31 @@ EffectTables richEffects(std::uint32_t number) {
     tables.trackBytes.resize(2 * f + 2, static_cast<std::byte>(f + number));
     tables.trackPoints.push_back({{0, {static_cast<float>(f) + n, 1, 2}}});
   }
+  tables.trackRadii.resize(5);
   return tables;
+}
+
+// To the second effect, an emitter of three given particles whose radii change.
+void addGiven(EffectTables& tables, std::uint32_t number) {
+  EmitterRecord emitter = plainEmitter();
+  emitter.firstSpan = static_cast<std::uint32_t>(tables.spans.size());
+  emitter.spanCount = 0;
+  emitter.firstGiven = static_cast<std::uint32_t>(tables.given.size());
+  emitter.givenCount = 3;
+  emitter.track = static_cast<std::uint32_t>(tables.tracks.size());
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    tables.given.push_back({0.25f * static_cast<float>(i), 2, 0, 3, 1, {1, 0.5f, 1}, 10 * number + i, 0});
+  }
+  tables.tracks.push_back({static_cast<std::uint32_t>(tables.trackFrames.size()), 2, 1, kTrackRadii});
+  for (std::uint32_t f = 0; f < 2; ++f) {
+    tables.trackFrames.push_back({tables.trackBytes.size(), 1, 3});
+    tables.trackBytes.push_back(static_cast<std::byte>(number));
+    const auto at = static_cast<float>(f + number);
+    tables.trackPoints.push_back({{0, {at, 1, 2}}, {1, {at, 3, 2}}, {2, {at, 5, 2}}});
+    tables.trackRadii.push_back({1, 0.25f * at, 0.5f});
+  }
+  tables.emitters.push_back(emitter);
+  ++tables.effects.back().emitterCount;
 }
 
 // The same particles, and they add the same everywhere that is looked at.
@@ -123,6 +147,24 @@ TEST(GatherEffects, HoldsOnlyWhatIsUsedAndThatOnce) {
   gathered.add(a, 0);  // one map more, the material of the first
   EXPECT_EQ(tables.materials.size(), 2u);
   EXPECT_EQ(tables.maps.size(), 4u);
+}
+
+TEST(GatherEffects, GivenParticlesGoAlong) {
+  EffectTables a = richEffects(1), b = richEffects(2);
+  addGiven(a, 1);
+  addGiven(b, 2);
+  GatheredEffects gathered;
+  const std::uint32_t none = gathered.add(a, 0), first = gathered.add(b, 1), second = gathered.add(a, 1);
+  expectSameEffect(a, 0, gathered.tables(), none);
+  expectSameEffect(b, 1, gathered.tables(), first);
+  expectSameEffect(a, 1, gathered.tables(), second);
+  gathered.add(a, 1, 0.5f, 1);  // has rows of its own
+  const EffectTables& tables = gathered.tables();
+  EXPECT_EQ(tables.given.size(), 9u);
+  EXPECT_EQ(tables.emitters.back().firstGiven, 6u);
+  EXPECT_EQ(tables.tracks.size(), 4u);  // shared
+  EXPECT_EQ(tables.trackRadii.size(), tables.trackFrames.size());
+  EXPECT_EQ(tables.trackRadii[4], (std::vector<float>{1, 0.75f, 0.5f}));
 }
 
 // Each with its look, and as bright as a pack's rules allow.

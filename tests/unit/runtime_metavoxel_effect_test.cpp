@@ -72,14 +72,49 @@ EmitterRecord everything(format::EffectTables& tables) {
   return emitter;
 }
 
-// An effect with four emitters: the above; boxes along their velocity; one whose points go round in a track; and one
-// on a mesh, along its normals.
+// Particles that come from files: some appear between two frames, some are there before or after their points are, and
+// all rest in the run's last half second, which has no frames. The later half end with the run.
+void addGiven(EmitterRecord emitter, format::EffectTables& tables) {
+  constexpr std::uint32_t kCount = 90, kFrames = 36;
+  constexpr float kRate = 10;
+  emitter.firstSpan = static_cast<std::uint32_t>(tables.spans.size());
+  emitter.spanCount = 0;
+  emitter.givenCount = kCount;
+  emitter.track = static_cast<std::uint32_t>(tables.tracks.size());
+  emitter.lifetime[0] = 0.5f;
+  emitter.lifetime[1] = 2.5f;
+  tables.emitters.push_back(emitter);
+  for (std::uint32_t n = 0; n < kCount; ++n) {
+    const float share = static_cast<float>(n) / kCount;
+    const float time = 3.9f * share, lifetime = std::min(0.5f + 2 * share * share, 4 - time);
+    tables.given.push_back(
+        {time, lifetime, 0.3f * share, 2 + share, 0.5f + share, {1, share, 1 - share}, n * 2654435761u, 0});
+  }
+  tables.tracks.push_back({static_cast<std::uint32_t>(tables.trackFrames.size()), kFrames, kRate, format::kTrackRadii});
+  for (std::uint32_t f = 0; f < kFrames; ++f) {
+    tables.trackPoints.emplace_back();
+    tables.trackRadii.emplace_back();
+    const float time = static_cast<float>(f) / kRate;
+    for (std::uint32_t n = 0; n < kCount; ++n) {
+      const format::GivenParticle& given = tables.given[n];
+      const float late = n % 5 == 0 ? 0.2f : 0, early = n % 7 == 0 ? 0.3f : 0;
+      if (time < given.time + late || time > given.time + given.lifetime - early) continue;
+      const float turn = 0.7f * time + static_cast<float>(n);
+      tables.trackPoints.back().push_back({n, {4 * std::cos(turn), 2 * time, 4 * std::sin(turn)}});
+      tables.trackRadii.back().push_back(0.5f + 0.4f * std::cos(turn));
+    }
+    tables.trackFrames.push_back({0, 0, static_cast<std::uint32_t>(tables.trackPoints.back().size())});
+  }
+}
+
+// An effect with five emitters: the above; boxes along their velocity; one whose points go round in a track; one on a
+// mesh, along its normals; and given particles.
 format::EffectTables richEffect() {
   format::EffectTables tables;
   tables.materials = plainTables().materials;
   tables.maps.resize(6);
   format::EffectRecord effect{};
-  effect.emitterCount = 4;
+  effect.emitterCount = 5;
   effect.seed = 99;
   effect.duration = 4;
   effect.flags = format::kEffectLoop | format::kEffectPrewarm;
@@ -117,6 +152,7 @@ format::EffectTables richEffect() {
   tables.tracks.push_back({0, 100, 25, 0});
   tables.trackFrames.resize(100);
   tables.trackPoints.resize(100);
+  tables.trackRadii.resize(100);
   for (std::uint32_t f = 0; f < 100; ++f) {
     // Some are born late, some are gone early.
     for (std::uint32_t n = f < 12 ? 50 - 4 * f : 0; n < (f > 80 ? 30u : 50u); ++n) {
@@ -124,6 +160,7 @@ format::EffectTables richEffect() {
       tables.trackPoints[f].push_back({n, {3 + 2 * std::cos(turn), 0.1f * static_cast<float>(f), 2 * std::sin(turn)}});
     }
   }
+  addGiven(aligned, tables);
   return tables;
 }
 
@@ -151,7 +188,7 @@ TEST_F(MetavoxelEffects, AreWhatTheCpuMakesOfThem) {
   for (const std::uint32_t flags : {format::kEffectLoop | format::kEffectPrewarm, format::kEffectLoop, 0u}) {
     tables_.effects[0].flags = flags;
     const auto made = make(config_);
-    for (const double time : {0.0, 0.02, 0.9, 1.0, 2.2, 3.99, 4.5, 6.0, 9.3}) {
+    for (const double time : {0.0, 0.02, 0.9, 1.0, 2.2, 3.99, 4.0, 4.5, 6.0, 8.0, 9.3}) {
       const MetavoxelEffect effect{.effect = 0, .time = time};
       draw_.effects = {&effect, 1};
       same.expect(format::particlesAt(tables_, 0, time), particlesOf(*made));
@@ -232,13 +269,17 @@ TEST_F(MetavoxelEffects, KeepTheLimitOfParticles) {
 }
 
 TEST_F(MetavoxelEffects, CountTheirTracksInTheBudget) {
-  std::uint64_t bytes = 0;
-  for (const auto& frame : tables_.trackPoints) bytes += frame.size() * sizeof(format::TrackPoint);
+  std::uint64_t bytes = tables_.given.size() * sizeof(format::GivenParticle);
+  for (const auto& frame : tables_.trackPoints) bytes += frame.size() * (sizeof(format::TrackPoint) + sizeof(float));
   const std::uint64_t with = make(config_)->bytesAllocated();
   tables_.emitters[2].track = format::kNoTrack;
+  tables_.emitters.pop_back();
+  --tables_.effects[0].emitterCount;
+  tables_.given.clear();
   tables_.tracks.clear();
   tables_.trackFrames.clear();
   tables_.trackPoints.clear();
+  tables_.trackRadii.clear();
   EXPECT_GE(with, make(config_)->bytesAllocated() + bytes);
   EXPECT_GT(bytes, 60000u);
 }

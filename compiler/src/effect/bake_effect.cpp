@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "effect/noise_map.h"
+#include "effect/particle_files.h"
 #include "effect/simulate.h"
 #include "effect/surface_points.h"
 #include "stages.h"
@@ -28,12 +29,14 @@ class Baker {
     record.seed = effect.seed;
     record.duration = effect.duration;
     for (std::uint32_t e = 0; e < record.emitterCount; ++e) {
+      const EmitterDescription& emitter = effect.emitters[e];
       const std::string where = fmt::format("{}: emitters[{}]", effect.file, e);
-      addEmitter(effect.emitters[e], effect.duration, where);
-      if (!needsTrack(effect.emitters[e])) continue;
-      const TrackPoints points = simulate(birthsOf(effects_, record, e), effect.emitters[e], where);
+      addEmitter(emitter, effect.duration, where);
+      if (emitter.given) addGiven(emitter, where);
+      if (!needsTrack(emitter)) continue;
+      const TrackPoints points = simulate(birthsOf(effects_, record, e), emitter, where);
       effects_.emitters.back().track =
-          addTrack(points, effect.emitters[e].trackRate, effect.emitters[e].trackError, where, effects_);
+          addTrack({points, {}, emitter.trackRate, emitter.trackError, 0}, where, effects_);
     }
     effects_.effects.push_back(record);
   }
@@ -76,6 +79,19 @@ class Baker {
       throw Error(Fault::input, fmt::format("{}.position: its mesh's middle would be at {}; expected at most {}", where,
                                             middle, format::kMaxMagnitude));
     }
+  }
+
+  void addGiven(const EmitterDescription& emitter, const std::string& where) {
+    const GivenParticles& given = *emitter.given;
+    format::EmitterRecord& record = effects_.emitters.back();
+    record.firstGiven = static_cast<std::uint32_t>(effects_.given.size());
+    record.givenCount = static_cast<std::uint32_t>(given.particles.size());
+    effects_.given.insert(effects_.given.end(), given.particles.begin(), given.particles.end());
+    // Shares are as exact as the greatest radius that they make.
+    const double greatest = greatestRadius(emitter);
+    const double radiusError = greatest > 0 ? emitter.trackError / greatest : 1;
+    record.track =
+        addTrack({given.points, given.radii, given.framesPerSecond, emitter.trackError, radiusError}, where, effects_);
   }
 
   // The first of `count` consecutive rows, one a component, over [0, end].

@@ -69,10 +69,23 @@ struct MeshShape {
   std::array<double, 3> scale{1, 1, 1};
 };
 
+// Where particles are, by frame, in ascending numbers.
+using TrackPoints = std::vector<std::vector<format::TrackPoint>>;
+
+// Particles from files.
+struct GivenParticles {
+  std::vector<format::GivenParticle> particles;  // by number
+  TrackPoints points;
+  std::vector<std::vector<float>> radii;  // of the points, as shares of their particle's; empty: all are 1
+  float framesPerSecond = 24;
+  std::vector<std::string> files;
+};
+
 struct EmitterDescription {
   std::string name;
   format::EmitterRecord record{};  // its numbers; what refers to tables comes with the tables
   std::vector<format::SpawnSpan> spans;
+  std::optional<GivenParticles> given;  // instead of spans
   // Over the effect's time (position) or a particle's life; empty: none.
   Keys position, radius, opacity, diffuse, rotation, displacement;
   std::optional<Emission> emission;     // where it is not constant

@@ -14,9 +14,14 @@ namespace billow::compiler {
 // and what was expected, also where more particles would be born or alive than a pack may have.
 EffectDescription readEffect(const std::string& path);
 
-// ---- Parts of it, each for one member. Throw json::Error, and Error for pictures. `folder` is that of the
+// ---- Parts of it, each for one member. Throw json::Error, and Error for other files. `effect` has what stands before
+// its emitters. `folder` is that of the
 // description, to which paths are relative.
-EmitterDescription readEmitter(const json::Value& value, float duration, const std::filesystem::path& folder);
+EmitterDescription readEmitter(const json::Value& value, const EffectDescription& effect,
+                               const std::filesystem::path& folder);
+// Particles from files: fills what is given, the lifetimes and the track's error where one is asked for.
+void readParticles(const json::Value& value, const EffectDescription& effect, const std::filesystem::path& folder,
+                   EmitterDescription& emitter);
 // What a particle is made of: fills what the record, the curves and the material have of it.
 void readPrimitive(const json::Value& value, const std::filesystem::path& folder, EmitterDescription& emitter);
 

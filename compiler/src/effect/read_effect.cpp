@@ -23,11 +23,13 @@ void readFlags(const Value& root, EffectDescription& effect) {
 void checkAlive(const Value& root, const EffectDescription& effect) {
   std::uint64_t alive = 0;
   for (const EmitterDescription& emitter : effect.emitters) {
-    alive += format::mostAlive(emitter.record, emitter.spans, effect.duration, effect.flags != 0);
+    alive += emitter.given ? format::mostAlive(emitter.given->particles, effect.duration, effect.flags != 0)
+                           : format::mostAlive(emitter.record, emitter.spans, effect.duration, effect.flags != 0);
   }
   if (alive <= format::kMaxAlive) return;
   throw json::Error(
-      fmt::format("{}: {} particles may be alive at once; expected at most {}: lower rate, bursts or lifetime",
+      fmt::format("{}: {} particles may be alive at once; expected at most {}: lower rate, bursts or lifetime, or "
+                  "take fewer from files",
                   root.place(), alive, format::kMaxAlive));
 }
 
@@ -44,7 +46,7 @@ EffectDescription readRoot(const Value& root, const std::filesystem::path& folde
   if (emitters.size() > format::kMaxEmitters) list.fail(fmt::format("at most {} emitters", format::kMaxEmitters));
   std::set<std::string> names;
   for (const Value& emitter : emitters) {
-    effect.emitters.push_back(readEmitter(emitter, effect.duration, folder));
+    effect.emitters.push_back(readEmitter(emitter, effect, folder));
     if (!names.insert(effect.emitters.back().name).second) emitter.at("name").fail("a name that no other emitter has");
   }
   checkAlive(root, effect);

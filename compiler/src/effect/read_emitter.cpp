@@ -4,6 +4,7 @@
 #include <string>
 
 #include "billow/format/exact_math.h"
+#include "effect/particle_files.h"
 #include "effect/read.h"
 
 namespace billow::compiler {
@@ -182,30 +183,51 @@ void readBursts(const Value& value, double duration, EmitterDescription& emitter
   }
 }
 
-}  // namespace
-
-EmitterDescription readEmitter(const Value& value, float duration, const std::filesystem::path& folder) {
-  value.requireKeys({"name", "shape", "position", "rate", "bursts", "lifetime", "velocity", "inheritedVelocity",
-                     "forces", "tracks", "primitive"});
-  EmitterDescription emitter;
+// How many particles are born where and when, and how they move.
+void readBirths(const Value& value, double duration, const std::filesystem::path& folder, EmitterDescription& emitter) {
   format::EmitterRecord& record = emitter.record;
-  const double seconds = static_cast<double>(duration);
-  emitter.name = value.at("name").name("an emitter's name");
-  record.direction[1] = 1;
-  record.spreadCosine = 1;
   if (const auto shape = value.find("shape")) readShape(*shape, folder, emitter);
-  if (const auto position = value.find("position")) emitter.position = readVectorCurve(*position, {0, seconds}, kAny);
-  if (const auto rate = value.find("rate")) readRate(*rate, seconds, emitter);
-  if (const auto bursts = value.find("bursts")) readBursts(*bursts, seconds, emitter);
-  if (emitter.spans.empty()) value.fail("a rate or bursts by which at least one particle is born");
+  if (const auto position = value.find("position")) emitter.position = readVectorCurve(*position, {0, duration}, kAny);
+  if (const auto rate = value.find("rate")) readRate(*rate, duration, emitter);
+  if (const auto bursts = value.find("bursts")) readBursts(*bursts, duration, emitter);
+  if (emitter.spans.empty()) value.fail("a rate or bursts by which at least one particle is born, or particles");
   readSpan(value.at("lifetime"), {0.001, static_cast<double>(format::kMaxLifetime)}, record.lifetime);
   if (const auto velocity = value.find("velocity")) readVelocity(*velocity, record);
   if (const auto share = value.find("inheritedVelocity")) record.inheritance = share->single({-10, 10});
   if (const auto forces = value.find("forces")) readForces(*forces, emitter);
+}
+
+void refuseBirths(const Value& value) {
+  for (const char* key :
+       {"shape", "position", "rate", "bursts", "lifetime", "velocity", "inheritedVelocity", "forces", "tracks"}) {
+    if (const auto member = value.find(key)) member->fail("none beside \"particles\", whose files say it");
+  }
+}
+
+}  // namespace
+
+EmitterDescription readEmitter(const Value& value, const EffectDescription& effect,
+                               const std::filesystem::path& folder) {
+  value.requireKeys({"name", "shape", "position", "rate", "bursts", "lifetime", "velocity", "inheritedVelocity",
+                     "forces", "tracks", "particles", "primitive"});
+  EmitterDescription emitter;
+  format::EmitterRecord& record = emitter.record;
+  emitter.name = value.at("name").name("an emitter's name");
+  record.direction[1] = 1;
+  record.spreadCosine = 1;
+  const auto particles = value.find("particles");
+  if (particles) {
+    refuseBirths(value);
+    readParticles(*particles, effect, folder, emitter);
+  } else {
+    readBirths(value, static_cast<double>(effect.duration), folder, emitter);
+  }
   readPrimitive(value.at("primitive"), folder, emitter);
   // A hundredth of a typical radius is not seen.
-  emitter.trackError = record.radius[1] > 0 ? static_cast<double>(record.radius[1]) / 100 : 0.01;
+  const double typical = greatestRadius(emitter);
+  if (!(emitter.trackError > 0)) emitter.trackError = typical > 0 ? typical / 100 : 0.01;
   if (const auto tracks = value.find("tracks")) readTracks(*tracks, emitter);
+  if (emitter.given) settleRadii(emitter);
   return emitter;
 }
 

@@ -201,7 +201,9 @@ void readPrimitive(const Value& value, const std::filesystem::path& folder, Emit
   format::EmitterRecord& record = emitter.record;
   record.kind = static_cast<std::uint32_t>(value.at("kind").word({"sphere", "ellipsoid", "capsule", "box"}));
   readProportions(value, record);
-  readSpan(value.at("radius"), kPositive, record.radius);
+  const auto radius = value.find("radius");
+  record.radius[0] = record.radius[1] = 1;  // what is given has radii of its own
+  if (radius || !emitter.given) readSpan(value.at("radius"), kPositive, record.radius);
   if (const auto curve = value.find("radiusOverLife")) emitter.radius = readCurve(*curve, kLife, {0, 1000});
   emitter.material.softness = 0.25f;
   emitter.material.erosionFrequency = 1;

@@ -10,17 +10,22 @@
 
 namespace billow::compiler {
 
-using TrackPoints = std::vector<std::vector<format::TrackPoint>>;  // by frame, ascending numbers
-
 // Where the particles of one run are in each frame: those that are alive then, or die in the frame time before.
 // `where` names the emitter in messages. Throws Error(Fault::input) where a pack cannot hold as many.
 TrackPoints simulate(std::span<const format::Birth> births, const EmitterDescription& emitter,
                      const std::string& where);
 
-// Appends the track to the tables and returns its number; no point is off by more than `error` of a world unit.
-// Throws Error(Fault::input) where such an error is too small for the distances.
-std::uint32_t addTrack(const TrackPoints& frames, float framesPerSecond, double error, const std::string& where,
-                       format::EffectTables& tables);
+struct TrackSource {
+  const TrackPoints& points;
+  std::span<const std::vector<float>> radii;  // by frame, one a point; empty: none
+  float framesPerSecond;
+  double error;        // world units, by which no point is off
+  double radiusError;  // by which no radius is
+};
+
+// Appends the track to the tables and returns its number. Throws Error(Fault::input) where the error is too small for
+// the distances.
+std::uint32_t addTrack(const TrackSource& source, const std::string& where, format::EffectTables& tables);
 
 }  // namespace billow::compiler
 

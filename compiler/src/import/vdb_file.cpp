@@ -8,6 +8,7 @@
 #include <set>
 
 #include "import/byte_reader.h"
+#include "import/vdb_points_walk.h"
 #include "import/vdb_walk.h"
 #include "stages.h"
 
@@ -22,6 +23,7 @@ constexpr std::uint32_t kNewestVersion = 224;  // OpenVDB 5 to 12
 constexpr std::uint64_t kUuidBytes = 36;
 constexpr std::uint32_t kMostGrids = 100000;
 constexpr std::uint32_t kMostMetadata = 100000;
+constexpr std::string_view kPointTree = "Tree_ptdataidx32_5_4_3";
 constexpr std::string_view kHalfSuffix = "_HalfFloat";
 constexpr char kUniqueSeparator = '\x1e';  // between a grid's name and the number that makes it unique
 
@@ -103,6 +105,7 @@ void readMetadataValue(ByteReader& reader, const std::string& name, const std::s
   reader.skip(bytes, "metadata");
 }
 
+// Of a grid where it is not null.
 void readMetadata(ByteReader& reader, VdbGrid* grid) {
   const auto count = reader.value<std::uint32_t>("the number of metadata");
   if (count > kMostMetadata) reader.fail(fmt::format("{} metadata claimed", count));
@@ -134,6 +137,7 @@ void setType(VdbGrid& grid, std::string tree) {
   for (const VdbType& type : kTypes) {
     if (type.tree == tree) grid.type = &type;
   }
+  grid.points = tree == kPointTree;
   grid.treeType = std::move(tree);
 }
 
@@ -163,7 +167,7 @@ VdbGrid readGrid(ByteReader& reader, bool hasOffsets) {
   if (hasOffsets) {
     const Span span = readOffsets(reader, grid);
     grid.endOffset = span.end;
-    if (grid.type != nullptr) {
+    if (grid.type != nullptr || grid.points) {
       reader.seek(span.grid);
       reader.setLimit(span.end);
       readGridHead(reader, grid);
@@ -262,6 +266,23 @@ void checkVdbGrid(const VdbFile& file, const VdbGrid& grid) {
   reader.setLimit(tree->endOffset);
   reader.seek(tree->treeOffset);
   walkTree(reader, *tree);
+}
+
+void skipMetadata(ByteReader& reader) {
+  readMetadata(reader, nullptr);
+}
+
+std::uint64_t checkVdbPoints(const VdbFile& file, const VdbGrid& grid, std::uint64_t most) {
+  constexpr std::uint32_t kMultiPassVersion = 224;
+  if (file.version < kMultiPassVersion || !grid.instanceParent.empty()) {
+    throw Error(Fault::input, fmt::format("{}: grid '{}': points of an OpenVDB before 5, or that share the tree of "
+                                          "another grid; save the file again",
+                                          file.path, grid.name));
+  }
+  ByteReader reader(file.path);
+  reader.setLimit(grid.endOffset);
+  reader.seek(grid.treeOffset);
+  return walkPoints(reader, grid, most);
 }
 
 }  // namespace billow::compiler

@@ -34,6 +34,7 @@ struct VdbGrid {
   bool halfFlag = false;          // the same, as the metadata say it
   std::string instanceParent;     // unique name of the grid whose tree this one shares, or ""
   const VdbType* type = nullptr;  // null: cannot be compiled
+  bool points = false;            // a point grid: particles (points.h), no volume
   std::string gridClass;          // "fog volume", "level set", ... or "" where not known
   std::string mapType;            // "UniformScaleMap", ...; "" where the type cannot be compiled
   std::uint32_t compression = 0;  // OpenVDB's flags: 1 zip, 2 active mask, 4 blosc
@@ -57,6 +58,9 @@ format::SourceType sourceTypeOf(const VdbGrid& grid);
 // Walks the nodes of a grid whose type is not null; throws Error(Fault::input) at the first size, count or offset that
 // cannot be right. What is left for OpenVDB to find is the contents of compressed blocks.
 void checkVdbGrid(const VdbFile& file, const VdbGrid& grid);
+
+// The same for a point grid, whose points it counts. Throws Error(Fault::input) also where they are more than `most`.
+std::uint64_t checkVdbPoints(const VdbFile& file, const VdbGrid& grid, std::uint64_t most);
 
 }  // namespace billow::compiler
 

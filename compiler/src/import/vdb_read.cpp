@@ -6,10 +6,8 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetUtil.h>
 
-#include <cmath>
-#include <mutex>
-
 #include "import/tree_source.h"
+#include "import/vdb_open.h"
 
 namespace billow::compiler {
 namespace {
@@ -34,28 +32,6 @@ void levelSetToFog(GridT& grid, const std::string& what, const ReadContext& cont
     TreeSource(grid.tree(), grid.getName(), what, context).convertTo(0, checked);
     openvdb::tools::sdfToFogVolume(grid);
   }
-}
-
-// 3x4 row-major. Asked of the map itself: OpenVDB's general matrix refuses voxels of less than 3e-15 cubic units.
-std::array<double, 12> matrixOf(const openvdb::math::Transform& transform, const std::string& what) {
-  if (!transform.isLinear()) throw Error(Fault::input, what + ": its transform is not affine");
-  const openvdb::math::MapBase& map = *transform.baseMap();
-  const openvdb::Vec3d columns[4] = {map.applyJacobian({1, 0, 0}), map.applyJacobian({0, 1, 0}),
-                                     map.applyJacobian({0, 0, 1}), map.applyMap({0, 0, 0})};
-  std::array<double, 12> result{};
-  bool sound = true;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) {
-      const double value = columns[column][row] + 0.0;  // no negative zero
-      sound = sound && std::isfinite(value);
-      result[static_cast<std::size_t>(row) * 4 + static_cast<std::size_t>(column)] = value;
-    }
-  }
-  const double volume = columns[0].dot(columns[1].cross(columns[2]));
-  if (!sound || volume == 0 || !std::isfinite(volume)) {
-    throw Error(Fault::input, what + ": its transform is singular or not finite");
-  }
-  return result;
 }
 
 template <class GridT>
@@ -105,40 +81,6 @@ ReadFunction readerOf(format::SourceType type) {
       return readAs<openvdb::Vec3IGrid>;
   }
   throw Error(Fault::internal, "a source type without a reader");
-}
-
-struct GridRegistry : openvdb::GridBase {
-  using openvdb::GridBase::registerGrid;
-};
-
-// OpenVDB refuses to open a file that names a type it does not know, also where that grid is never read. So such a type
-// is registered under its name; nothing is ever made of it, for only grids with a VdbType are read.
-void registerTypes(const VdbFile& file) {
-  static std::mutex mutex;
-  const std::lock_guard lock(mutex);
-  openvdb::initialize();
-  for (const VdbGrid& grid : file.grids) {
-    if (openvdb::GridBase::isRegistered(grid.treeType)) continue;
-    GridRegistry::registerGrid(grid.treeType, [] { return openvdb::GridBase::Ptr(openvdb::MaskGrid::create()); });
-  }
-}
-
-// Runs `read`, turning whatever OpenVDB throws into one line.
-template <class Read>
-void guarded(const std::string& path, const Read& read) {
-  try {
-    read();
-  } catch (const Error&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw;
-  } catch (const openvdb::ArithmeticError& error) {
-    throw Error(Fault::input, fmt::format("{}: OpenVDB cannot read it: {}; a transform is singular, or its voxels are "
-                                          "too small for OpenVDB (less than 3e-15 cubic units)",
-                                          path, error.what()));
-  } catch (const std::exception& error) {
-    throw Error(Fault::input, fmt::format("{}: damaged: OpenVDB cannot read it: {}", path, error.what()));
-  }
 }
 
 }  // namespace

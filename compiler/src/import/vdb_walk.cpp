@@ -36,9 +36,14 @@ class Walker {
  public:
   Walker(ByteReader& reader, const VdbGrid& grid) : reader_(reader), grid_(grid) {}
 
-  void walk() {
+  // Returns the number of leaves.
+  std::size_t walkTopology() {
     if (reader_.value<std::uint32_t>("the number of buffers") != 1) reader_.fail("a tree with other than one buffer");
     readRoot();
+    return activeCounts_.size();
+  }
+  void walk() {
+    walkTopology();
     for (std::size_t i = 0; i < activeCounts_.size(); ++i) readLeafBuffer(i);
   }
 
@@ -170,6 +175,13 @@ void skipBlosc(ByteReader& reader, std::uint64_t stored, std::uint64_t raw) {
     reader.fail("a compressed block's header is wrong");
   }
   reader.skip(stored - kHeaderBytes, "a compressed block");
+}
+
+std::size_t walkPointTopology(ByteReader& reader, const VdbGrid& grid) {
+  static constexpr VdbType kIndices{"", format::SourceType::int32, 4, 4, 1, false};
+  VdbGrid indices = grid;
+  indices.type = &kIndices;
+  return Walker(reader, indices).walkTopology();
 }
 
 void walkTree(ByteReader& reader, const VdbGrid& grid) {

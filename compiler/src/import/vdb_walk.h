@@ -11,6 +11,9 @@ namespace billow::compiler {
 // decompressed; memory is two bytes a leaf. Throws Error(Fault::input).
 void walkTree(ByteReader& reader, const VdbGrid& grid);
 
+// The topology alone, of a tree whose nodes hold four bytes a value: returns the number of leaves.
+std::size_t walkPointTopology(ByteReader& reader, const VdbGrid& grid);
+
 // Skips a Blosc chunk of `stored` bytes whose header must say that it holds `raw` bytes: Blosc itself believes the
 // sizes in there.
 void skipBlosc(ByteReader& reader, std::uint64_t stored, std::uint64_t raw);

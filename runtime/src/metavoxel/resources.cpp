@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <utility>
+#include <vector>
 
 #include "billow/format/gpu_size.h"
 #include "params.h"
@@ -24,7 +25,7 @@ Result<void> keep(Result<T> made, T& place) {
 
 // The sections of the tables' staging memory, and where all but the last go.
 struct TableParts {
-  std::uint64_t materials, curves, ramps, emitters, points, surfaces, cubes, bytes;
+  std::uint64_t materials, curves, ramps, emitters, points, radii, given, surfaces, cubes, bytes;
 };
 
 TableParts tableParts(const MetavoxelSizes& sizes) {
@@ -34,6 +35,8 @@ TableParts tableParts(const MetavoxelSizes& sizes) {
   parts.ramps = regions.ramps - regions.materials;
   parts.emitters = regions.emitters - regions.materials;
   parts.points = regions.points - regions.materials;
+  parts.radii = regions.radii - regions.materials;
+  parts.given = regions.given - regions.materials;
   parts.surfaces = regions.surfaces - regions.materials;
   parts.cubes = regions.columns - regions.materials;
   parts.bytes = parts.cubes + std::uint64_t{sizes.cubeLayers} * kFace * kFace;
@@ -107,7 +110,9 @@ void MetavoxelResources::addAddresses(gpu::MetavoxelParams& params) const {
   params.work = both(r.volumeWork, r.fillWork);
   params.emitters = both(r.emitters, r.points);
   params.spawn = both(r.jobs, 0);
-  params.surfaces = both(r.surfaces, 0);
+  params.surfaces = both(r.surfaces, r.given);
+  params.radii = both(r.radii, 0);
+  params.radii.z = hasRadii_ ? 1 : 0;
   params.kept = both(r.kept, r.slots);
   params.spare = both(r.spare, r.fills);
   params.matter.x = both(r.albedo, 0).x;
@@ -117,6 +122,7 @@ void MetavoxelResources::addAddresses(gpu::MetavoxelParams& params) const {
 
 Result<void> MetavoxelResources::create(const MetavoxelConfig& config) {
   volumes_ = config.maxVolumes;
+  hasRadii_ = config.tables != nullptr && format::haveRadii(config.tables->tracks);
   const std::uint64_t particleBytes = std::uint64_t{config.maxParticles} * sizeof(format::Particle);
   static_assert(sizeof(gpu::MetavoxelParams) <= kMarchStride);
   uploadStride_ = (kMarchStride * (2 + volumes_) + particleBytes + 255) / 256 * 256;
@@ -250,12 +256,20 @@ void MetavoxelResources::fillTables(const MetavoxelConfig& config) {
   copy(config.tables->curves, parts.curves);
   copy(config.tables->ramps, parts.ramps);
   copy(config.tables->emitters, parts.emitters);
+  copy(config.tables->given, parts.given);
   copy(config.tables->surfacePoints, parts.surfaces);
   static_assert(sizeof(format::TrackPoint) == 16);
   std::uint64_t at = parts.points;
   for (const auto& frame : config.tables->trackPoints) {
     copy(frame, at);
     at += frame.size() * sizeof(format::TrackPoint);
+  }
+  at = parts.radii;
+  for (std::size_t f = 0; hasRadii_ && f < config.tables->trackPoints.size(); ++f) {
+    std::vector<float> radii = config.tables->trackRadii[f];
+    radii.resize(config.tables->trackPoints[f].size(), 1);
+    copy(radii, at);
+    at += radii.size() * sizeof(float);
   }
   at = parts.cubes;
   for (const format::CubeMap& map : config.tables->maps) {

@@ -59,7 +59,9 @@ class MetavoxelResources {
   MetavoxelSizes sizes_{};
   std::uint64_t uploadStride_ = 0;
   std::uint32_t volumes_ = 0;
-  Buffer tables_;  // materials, curves, ramps, emitters, tracks, meshes, cube maps' texels, until they are copied
+  bool hasRadii_ = false;  // tracks have
+  Buffer tables_;  // materials, curves, ramps, emitters, tracks, given particles, meshes, maps' texels, until they are
+                   // copied
 };
 
 }  // namespace billow::runtime

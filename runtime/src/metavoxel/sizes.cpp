@@ -12,10 +12,10 @@ std::uint64_t bytesOf(const Rows& rows) {
   return rows.size() * sizeof(rows[0]);
 }
 
-std::uint64_t pointBytes(const format::EffectTables& tables) {
-  std::uint64_t bytes = 0;
-  for (const auto& frame : tables.trackPoints) bytes += bytesOf(frame);
-  return bytes;
+std::uint64_t pointsOf(const format::EffectTables& tables) {
+  std::uint64_t points = 0;
+  for (const auto& frame : tables.trackPoints) points += frame.size();
+  return points;
 }
 
 // Slots as an image's box: rows of eight, layers of eight rows, or fewer, powers of two. Never more than asked for.
@@ -82,7 +82,9 @@ MetavoxelRegions regionsOf(const MetavoxelConfig& config, const MetavoxelSizes& 
   regions.curves = region(bytesOf(tables.curves));
   regions.ramps = region(bytesOf(tables.ramps));
   regions.emitters = region(bytesOf(tables.emitters));
-  regions.points = region(pointBytes(tables));
+  regions.points = region(pointsOf(tables) * sizeof(format::TrackPoint));
+  regions.radii = region(format::haveRadii(tables.tracks) ? pointsOf(tables) * sizeof(float) : 0);
+  regions.given = region(bytesOf(tables.given));
   regions.surfaces = region(bytesOf(tables.surfacePoints));
   regions.columns = region(most * sizes.inner * sizes.inner * 4);
   const std::uint64_t fieldVoxels = std::uint64_t{sizes.field.perCell} * sizes.field.perCell * sizes.field.perCell;

@@ -22,8 +22,8 @@ inline std::uint64_t texelBytes(const MetavoxelConfig& config) {
 // Where the arrays of metavoxel_interface.h begin in the device's buffer.
 struct MetavoxelRegions {
   std::uint64_t counters, rounds, words, positions, found, cellAt, lists, cursors, kept, slots, spare, fills, entries,
-      particles, jobs, materials, curves, ramps, emitters, points, surfaces, columns, fieldMatter, blocks, volumeWork,
-      fillWork, emission, albedo;
+      particles, jobs, materials, curves, ramps, emitters, points, radii, given, surfaces, columns, fieldMatter, blocks,
+      volumeWork, fillWork, emission, albedo;
   std::uint64_t bytes;
 };
 

@@ -1,5 +1,6 @@
 #include "spawn.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "billow/format/noise.h"
@@ -27,6 +28,7 @@ SpawnPlanner::SpawnPlanner(const format::EffectTables* tables) : points_{0} {
   tables_.effects = tables->effects;
   tables_.emitters = tables->emitters;
   tables_.spans = tables->spans;
+  tables_.given = tables->given;
   tables_.tracks = tables->tracks;
   for (const auto& frame : tables->trackPoints) {
     points_.push_back(points_.back() + static_cast<std::uint32_t>(frame.size()));
@@ -63,20 +65,12 @@ Result<SpawnPlan> SpawnPlanner::plan(const MetavoxelDraw& draw, const Vec3d& cen
 gpu::SpawnJob SpawnPlanner::jobOf(const Run& run, const format::Candidates& candidates) const {
   const std::uint32_t number = run.effect.firstEmitter + candidates.emitter;
   const format::EmitterRecord& emitter = tables_.emitters[number];
-  const format::SpawnSpan* spans = &tables_.spans[emitter.firstSpan];
-  const format::SpawnSpan& span = spans[candidates.span];
-  const std::uint32_t total = spans[emitter.spanCount - 1].first + spans[emitter.spanCount - 1].count;
   const double duration = double{run.effect.duration};
   const double now = run.time - static_cast<double>(candidates.run) * duration;
-  const double slot = (double{span.end} - double{span.begin}) / span.count;
-  const double born = double{span.begin} + slot * candidates.first;
-  // With a track, all runs are alike.
-  const std::uint32_t cycle = emitter.track == format::kNoTrack ? static_cast<std::uint32_t>(candidates.run) : 0;
   gpu::SpawnJob job{};
   job.numbers.y = number;
-  job.numbers.z = cycle * total + span.first + candidates.first;
   job.numbers.w = format::hashInteger(format::hashInteger(run.effect.seed) + candidates.emitter);
-  job.times = {single(now - born), single(slot), single(born / duration), single(slot / duration)};
+  addBirths(run, candidates, now, job);
   job.moments.z = single((format::kCurveSamples - 1) / duration);
   if (emitter.track != format::kNoTrack) addTrack(emitter, now, job);
   const auto& turn = run.toWorld.rotation;
@@ -88,9 +82,34 @@ gpu::SpawnJob SpawnPlanner::jobOf(const Run& run, const format::Candidates& cand
   return job;
 }
 
+void SpawnPlanner::addBirths(const Run& run, const format::Candidates& candidates, double now,
+                             gpu::SpawnJob& job) const {
+  const format::EmitterRecord& emitter = tables_.emitters[job.numbers.y];
+  if (emitter.givenCount > 0) {
+    job.numbers.z = candidates.first;
+    const double age = now - double{tables_.given[emitter.firstGiven + candidates.first].time};
+    job.times.x = single(age);
+    job.times.y = single(age - double{job.times.x});
+    return;
+  }
+  const format::SpawnSpan* spans = &tables_.spans[emitter.firstSpan];
+  const format::SpawnSpan& span = spans[candidates.span];
+  const std::uint32_t total = spans[emitter.spanCount - 1].first + spans[emitter.spanCount - 1].count;
+  const double duration = double{run.effect.duration};
+  const double slot = (double{span.end} - double{span.begin}) / span.count;
+  const double born = double{span.begin} + slot * candidates.first;
+  // With a track, all runs are alike.
+  const std::uint32_t cycle = emitter.track == format::kNoTrack ? static_cast<std::uint32_t>(candidates.run) : 0;
+  job.numbers.z = cycle * total + span.first + candidates.first;
+  job.times = {single(now - born), single(slot), single(born / duration), single(slot / duration)};
+}
+
 void SpawnPlanner::addTrack(const format::EmitterRecord& emitter, double now, gpu::SpawnJob& job) const {
   const format::TrackRecord& track = tables_.tracks[emitter.track];
-  const double rate = double{track.framesPerSecond}, frame = std::floor(now * rate);
+  const double rate = double{track.framesPerSecond};
+  // Given particles rest after their last frame.
+  const double last = emitter.givenCount > 0 ? track.frameCount - 1.0 : track.frameCount;
+  const double frame = std::min(std::floor(now * rate), last);
   const auto pointsOf = [&](double number, std::uint32_t& first, std::uint32_t& count) {
     if (!(number < track.frameCount)) return;
     const std::size_t index = track.firstFrame + static_cast<std::size_t>(number);

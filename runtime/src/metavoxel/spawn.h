@@ -28,9 +28,10 @@ class SpawnPlanner {
  private:
   struct Run;
   gpu::SpawnJob jobOf(const Run& run, const format::Candidates& candidates) const;
+  void addBirths(const Run& run, const format::Candidates& candidates, double now, gpu::SpawnJob& job) const;
   void addTrack(const format::EmitterRecord& emitter, double now, gpu::SpawnJob& job) const;
 
-  format::EffectTables tables_;  // effects, emitters, spans and tracks alone
+  format::EffectTables tables_;  // effects, emitters, spans, given particles and tracks alone
   // Points of all tracks' frames before each frame, and of all.
   std::vector<std::uint32_t> points_;
 };

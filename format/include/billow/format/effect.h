@@ -65,6 +65,7 @@ struct EffectTables {
   std::vector<EffectRecord> effects;
   std::vector<EmitterRecord> emitters;
   std::vector<SpawnSpan> spans;
+  std::vector<GivenParticle> given;
   std::vector<ParticleMaterial> materials;
   std::vector<CurveRow> curves;
   std::vector<RampTable> ramps;
@@ -73,7 +74,9 @@ struct EffectTables {
   std::vector<TrackFrame> trackFrames;
   std::vector<std::byte> trackBytes;
   std::vector<SurfacePoint> surfacePoints;
-  std::vector<std::vector<TrackPoint>> trackPoints;  // the frames decoded, as an open pack has them; not written
+  // The frames decoded, as an open pack has them; not written. Radii of a frame are as many as points, or none.
+  std::vector<std::vector<TrackPoint>> trackPoints;
+  std::vector<std::vector<float>> trackRadii;
 
   bool empty() const { return effects.empty(); }
 };
@@ -87,19 +90,22 @@ float sampleCurve(const CurveRow& row, float x);
 // No more particles of the emitter than this are alive at any time. From the spans' and the lifetime's numbers alone,
 // so at most two more a span than can be.
 std::uint64_t mostAlive(const EmitterRecord& emitter, std::span<const SpawnSpan> spans, float duration, bool loop);
-// Of all emitters of an effect.
+// The same of given particles.
+std::uint64_t mostAlive(std::span<const GivenParticle> given, float duration, bool loop);
+// Of an emitter of an effect, or of all of them, however their particles are born.
+std::uint64_t mostAlive(const EffectTables& tables, const EffectRecord& effect, std::uint32_t emitter);
 std::uint64_t mostAlive(const EffectTables& tables, const EffectRecord& effect);
 
 // Particles first to last - 1 of a span: all that may be alive at a time, and a few that are not.
 struct Candidates {
   std::uint32_t emitter;  // of the effect
-  std::uint32_t span;     // of the emitter
+  std::uint32_t span;     // of the emitter; 0 for given particles
   std::int64_t run;       // of the effect, which begins at run * duration
   std::uint32_t first, last;
 };
 // Those of an effect `time` seconds after its begin, in [0, kMaxEffectTime], else none; by emitter, run and span,
-// without empty ones. Uses the tables of effects, emitters and spans alone. The work is that of spans and runs, not of
-// particles.
+// without empty ones. Uses the tables of effects, emitters, spans and given particles alone. The work is that of spans
+// and runs, not of particles.
 std::vector<Candidates> candidatesAt(const EffectTables& tables, std::uint32_t effect, double time);
 
 // How a particle sets out.

@@ -83,9 +83,25 @@ struct EmitterRecord {
   BILLOW_E_U32 track;       // kNoTrack: motion in closed form, by the numbers above
   BILLOW_E_U32 firstPoint;  // of SURF, with shape mesh, else 0
   BILLOW_E_U32 pointCount;
-  BILLOW_E_U32 reserved[5];
+  BILLOW_E_U32 firstGiven;  // of GIVN
+  BILLOW_E_U32 givenCount;  // 0: particles are born in spans
+  BILLOW_E_U32 reserved[3];
 };
 BILLOW_E_SIZE(EmitterRecord, 256);
+
+// A particle that was given when the pack was made, instead of being born in a span. An emitter has either these, in
+// order of `time`, or spans; its i-th is number i of its track, in every run.
+struct GivenParticle {
+  float time;       // of its birth, seconds into the run
+  float lifetime;   // seconds
+  float age;        // at its birth, of the life over which curves are read: seconds
+  float life;       // curves are read at (age + seconds since its birth) / life
+  float radius;     // factor of the emitter's
+  float colour[3];  // factor of the albedo
+  BILLOW_E_U32 id;  // its random numbers come from it
+  BILLOW_E_U32 reserved;
+};
+BILLOW_E_SIZE(GivenParticle, 40);
 
 #ifdef __cplusplus
 enum class EmitterShape : std::uint32_t {

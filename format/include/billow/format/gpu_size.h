@@ -49,8 +49,8 @@ inline constexpr std::uint64_t kGpuCubeBytes = std::uint64_t{kCubeFaces} * (kCub
 
 // Of effects, all of a pack drawn at once.
 struct EffectGpuBytes {
-  std::uint64_t materials = 0, curves = 0, ramps = 0, maps = 0, surfaces = 0, emitters = 0;
-  std::uint64_t tracks = 0;     // points of all frames
+  std::uint64_t materials = 0, curves = 0, ramps = 0, maps = 0, surfaces = 0, emitters = 0, given = 0;
+  std::uint64_t tracks = 0;     // points of all frames, with radii where any has them
   std::uint64_t particles = 0;  // as many as may be alive
   std::uint64_t total() const;
 };

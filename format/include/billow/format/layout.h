@@ -148,6 +148,7 @@ inline constexpr std::uint32_t kSectionMaterials = fourcc('M', 'T', 'R', 'L');  
 inline constexpr std::uint32_t kSectionCurves = fourcc('C', 'U', 'R', 'V');       // CurveRow[]
 inline constexpr std::uint32_t kSectionRamps = fourcc('R', 'A', 'M', 'P');        // RampTable[]
 inline constexpr std::uint32_t kSectionCubes = fourcc('C', 'U', 'B', 'E');        // CubeMap[]
+inline constexpr std::uint32_t kSectionGiven = fourcc('G', 'I', 'V', 'N');        // GivenParticle[]
 inline constexpr std::uint32_t kSectionTracks = fourcc('T', 'R', 'C', 'K');       // TrackRecord[]
 inline constexpr std::uint32_t kSectionTrackFrames = fourcc('T', 'R', 'F', 'R');  // TrackFrame[]
 inline constexpr std::uint32_t kSectionTrackBytes = fourcc('T', 'R', 'P', 'T');   // point clouds, one after another
