@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "ply_file.h"
 #include "run_command.h"
 
 namespace billow {
@@ -192,6 +193,62 @@ TEST_F(CompareEffects, ChangedCurvesAreErrors) {
   document = described();
   document["emitters"][0]["primitive"]["displacement"]["noise"]["seed"] = 9;
   EXPECT_GT(part(compare(document, 0), "displacement maps")["rmse"].get<double>(), 0.1);
+}
+
+class CompareGiven : public CompareEffects {
+ protected:
+  static json fromFiles() {
+    return json::parse(R"({"name": "swarm", "duration": 1, "emitters": [{"name": "bees",
+      "particles": {"files": "bees_####.ply", "framesPerSecond": 10, "error": 0.01},
+      "primitive": {"kind": "sphere", "density": {"extinction": 2}}}]})");
+  }
+  CompareGiven() {
+    for (int f = 0; f < 3; ++f) writeFrame(f, 40, 0);
+    write(fromFiles());
+    EXPECT_EQ(shell("$BILLOW compile " + file_ + " -o " + pack_).code, 0);
+  }
+  void writeFrame(int frame, int particles, double shift) {
+    std::vector<tests::PlyColumn> columns{
+        {"float", "x", {}}, {"float", "y", {}}, {"float", "z", {}}, {"float", "pscale", {}}, {"int", "id", {}}};
+    for (int i = 0; i < particles; ++i) {
+      const double values[] = {0.37 * i + shift, 0.71 * frame * i, 3, 0.5 + 0.1 * frame + 0.003 * i, 1.0 * i};
+      for (std::size_t c = 0; c < 5; ++c) columns[c].values.push_back(values[c]);
+    }
+    std::ofstream(folder_ / ("bees_000" + std::to_string(frame) + ".ply"), std::ios::binary)
+        << tests::plyText("binary_little_endian", columns);
+  }
+};
+
+TEST_F(CompareGiven, MeasuresPlacesAndRadii) {
+  const json report = compare(fromFiles(), 0);
+  EXPECT_EQ(report["sound"], true) << report.dump(1);
+  for (const char* name : {"track", "radii"}) {
+    const json measured = part(report, name);
+    EXPECT_EQ(measured["asked"], 0.01) << name;
+    EXPECT_GT(measured["maxError"].get<double>(), 0.0005) << name;
+    EXPECT_LE(measured["maxError"].get<double>(), 0.01) << name;
+  }
+  EXPECT_NEAR(part(report, "radii")["largest"].get<double>(), 0.7 + 0.003 * 39, 1e-6);
+  const json gpu = json::parse(shell("$BILLOW info " + pack_ + " --json").out);
+  EXPECT_EQ(gpu["gpu"]["effects"]["given"], 40 * 40);
+  EXPECT_EQ(gpu["gpu"]["effects"]["tracks"], 3 * 40 * (16 + 4));
+  EXPECT_EQ(gpu["effects"][0]["emitters"][0]["born"], 40);
+  EXPECT_EQ(gpu["effects"][0]["emitters"][0]["mostAlive"], 40);
+}
+
+TEST_F(CompareGiven, FindsWhatDiffers) {
+  json document = fromFiles();
+  document["emitters"][0]["particles"]["radius"] = false;
+  expectProblem(document, "radii", "only the pack has it");
+  document = fromFiles();
+  document["emitters"][0]["particles"]["framesPerSecond"] = 12;
+  expectProblem(document, "track", "10 a second, in the pack; 3 and 12");
+  writeFrame(1, 40, 0.25);  // places are errors, not others
+  EXPECT_NEAR(part(compare(fromFiles(), 0), "track")["maxError"].get<double>(), 0.25, 0.01);
+  for (int f = 0; f < 3; ++f) writeFrame(f, 39, 0);
+  expectProblem(fromFiles(), "numbers", "40 particles are given in the pack, 39 by the description's files");
+  expectProblem(fromFiles(), "track", "40 particles in frame 0 in the pack, 39");
+  expectProblem(described(), "", "the pack has no such effect");
 }
 
 TEST_F(CompareEffects, VolumesAndEffectsTogether) {

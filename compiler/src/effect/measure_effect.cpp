@@ -12,6 +12,7 @@
 #include "billow/format/particle_field.h"
 #include "effect/bake_effect.h"
 #include "effect/noise_map.h"
+#include "effect/particle_files.h"
 #include "effect/simulate.h"
 #include "effect/surface_points.h"
 
@@ -70,13 +71,29 @@ std::string differingNumbers(const format::EmitterRecord& pack, const EmitterDes
 }
 
 std::string differingSpans(std::span<const format::SpawnSpan> pack, std::span<const format::SpawnSpan> described) {
-  const auto born = [](std::span<const format::SpawnSpan> spans) { return spans.back().first + spans.back().count; };
+  const auto born = [](std::span<const format::SpawnSpan> spans) {
+    return spans.empty() ? 0 : spans.back().first + spans.back().count;
+  };
   if (born(pack) != born(described)) {
     return fmt::format("{} particles are born in a run in the pack, {} in the description", born(pack),
                        born(described));
   }
   const auto same = [](const auto& a, const auto& b) { return std::ranges::equal(bytesOf(a), bytesOf(b)); };
   return std::ranges::equal(pack, described, same) ? "" : "its particles are born at other times in the pack";
+}
+
+std::string differingGiven(std::span<const format::GivenParticle> pack, const EmitterDescription& emitter) {
+  const auto files = emitter.given ? std::span<const format::GivenParticle>(emitter.given->particles)
+                                   : std::span<const format::GivenParticle>();
+  if (pack.size() != files.size()) {
+    return fmt::format("{} particles are given in the pack, {} by the description's files", pack.size(), files.size());
+  }
+  for (std::size_t i = 0; i < pack.size(); ++i) {
+    if (std::ranges::equal(bytesOf(pack[i]), bytesOf(files[i]))) continue;
+    return fmt::format("particle {} (id {} in the pack, {} in its file) differs in time, radius or colour", i,
+                       pack[i].id, files[i].id);
+  }
+  return "";
 }
 
 std::string differingMaterial(const format::ParticleMaterial& pack, const format::ParticleMaterial& described) {
@@ -145,6 +162,7 @@ class EmitterMeasurement {
                 static_cast<double>(record_.displacement));
     measureMaps();
     measureTrack();
+    measureRadii();
     return std::move(parts_);
   }
 
@@ -158,8 +176,10 @@ class EmitterMeasurement {
   void measureNumbers() {
     PartError& numbers = add("numbers");
     const auto spans = std::span(tables_.spans).subspan(record_.firstSpan, record_.spanCount);
-    for (const std::string& problem : {differingNumbers(record_, emitter_), differingSpans(spans, emitter_.spans),
-                                       differingMaterial(material_, emitter_.material), differingSurface()}) {
+    const auto given = std::span(tables_.given).subspan(record_.firstGiven, record_.givenCount);
+    for (const std::string& problem :
+         {differingNumbers(record_, emitter_), differingSpans(spans, emitter_.spans), differingGiven(given, emitter_),
+          differingMaterial(material_, emitter_.material), differingSurface()}) {
       if (numbers.problem.empty()) numbers.problem = problem;
     }
     alike_ = numbers.sound();
@@ -273,24 +293,53 @@ class EmitterMeasurement {
   }
 
   void measureTrack() {
-    PartError* part = both("track", record_.track != format::kNoTrack, needsTrack(emitter_));
+    const bool described = emitter_.given || needsTrack(emitter_);
+    PartError* part = both("track", record_.track != format::kNoTrack, described);
     if (part == nullptr) return;
-    if (!alike_) {
+    if (!alike_ && !emitter_.given) {
       part->problem = "not simulated: its numbers differ";
       return;
     }
     part->asked = emitter_.trackError;
     const std::string where = fmt::format("{}: emitters[{}]", file_, number_);
-    const TrackPoints points = simulate(birthsOf(tables_, effect_, number_), emitter_, where);
+    const TrackPoints points =
+        emitter_.given ? emitter_.given->points : simulate(birthsOf(tables_, effect_, number_), emitter_, where);
+    const float rate = emitter_.given ? emitter_.given->framesPerSecond : emitter_.trackRate;
     const format::TrackRecord& track = tables_.tracks[record_.track];
-    if (track.frameCount != points.size() || track.framesPerSecond != emitter_.trackRate) {
+    if (track.frameCount != points.size() || track.framesPerSecond != rate) {
       part->problem = fmt::format("{} frames, {} a second, in the pack; {} and {} in the description", track.frameCount,
-                                  track.framesPerSecond, points.size(), emitter_.trackRate);
+                                  track.framesPerSecond, points.size(), rate);
       return;
     }
     Sums sums;
     for (std::size_t f = 0; f < points.size() && part->sound(); ++f) {
       part->problem = addDistances(points[f], tables_.trackPoints[track.firstFrame + f], f, sums);
+    }
+    sums.write(*part);
+    sameParticles_ = part->sound();
+  }
+
+  // Those of given particles that change, before curves: shares of their particle's, which are in the numbers.
+  void measureRadii() {
+    const bool pack = record_.track != format::kNoTrack && (tables_.tracks[record_.track].flags & format::kTrackRadii);
+    PartError* part = both("radii", pack, emitter_.given && !emitter_.given->radii.empty());
+    if (part == nullptr) return;
+    if (!alike_ || !sameParticles_) {
+      part->problem = "not measured: its numbers or its track differ";
+      return;
+    }
+    part->asked = emitter_.trackError;
+    const GivenParticles& given = *emitter_.given;
+    const std::uint32_t first = tables_.tracks[record_.track].firstFrame;
+    Sums sums;
+    for (std::size_t f = 0; f < given.radii.size(); ++f) {
+      const std::vector<float>& kept = tables_.trackRadii[first + f];
+      for (std::size_t i = 0; i < kept.size(); ++i) {
+        const auto whole = static_cast<double>(given.particles[given.points[f][i].number].radius) *
+                           static_cast<double>(record_.radius[1]);
+        const auto share = static_cast<double>(given.radii[f][i]);
+        sums.add((static_cast<double>(kept[i]) - share) * whole, share * whole, 1);
+      }
     }
     sums.write(*part);
   }
@@ -322,7 +371,8 @@ class EmitterMeasurement {
   const format::ParticleMaterial& material_;
   const EmitterDescription& emitter_;
   const std::string& file_;
-  bool alike_ = false;  // the numbers are
+  bool alike_ = false;          // the numbers are
+  bool sameParticles_ = false;  // in each of the track's frames
   std::vector<PartError> parts_;
 };
 

@@ -26,8 +26,9 @@ struct PartError {
 
 // Of each emitter, in order: its numbers, which are kept exactly or not at all; its curves and ramps, as the tables are
 // read, against the description at all radii and ages (a ramp's picture as it was sampled); its displacement maps, as
-// BC4 gives them back, against the noise or picture; its track, as Draco gives it back, against a new simulation: rmse
-// and maxError are distances. Throws Error as compiling does.
+// BC4 gives them back, against the noise or picture; its track, as Draco gives it back, against a new simulation or its
+// particles' files: rmse and maxError are distances; their radii likewise, where they change. Throws Error as compiling
+// does.
 std::vector<PartError> measureEffect(const format::Pack& pack, const format::EffectRecord& effect,
                                      const EffectDescription& description);
 
