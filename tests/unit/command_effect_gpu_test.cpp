@@ -41,8 +41,8 @@ TEST_P(SampleEffects, HaveTheSameParticlesOnTheGpu) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, SampleEffects,
-                         testing::Values("campfire_smoke", "cloud_bank", "dust_wave", "explosion", "magic_trail",
-                                         "steam_jet"),
+                         testing::Values("campfire_smoke", "cloud_bank", "dust_devil", "dust_wave", "explosion",
+                                         "magic_trail", "steam_jet"),
                          [](const auto& sample) { return std::string(sample.param); });
 
 }  // namespace

@@ -71,7 +71,7 @@ std::vector<char> compiled(const std::vector<std::string>& inputs, unsigned thre
 }
 
 TEST(EffectPacks, TheSamplesCompileToTheSameBytesOnAnyThreads) {
-  ASSERT_EQ(sampleEffects().size(), 7u);
+  ASSERT_EQ(sampleEffects().size(), 8u);
   const auto one = compiled(sampleEffects(), 1);
   EXPECT_EQ(one, compiled(sampleEffects(), 4));
   EXPECT_LT(one.size(), 2u << 20);
