@@ -53,6 +53,7 @@ uvec3 blockAt(uint number) {
 }
 
 void addVolumes(uint slot, uint cell, uint blocks) {
+  barrier();  // the place of the last items of particles has been read
   if (gl_LocalInvocationID.x == 0u) {
     firstItem = atomicAdd(Rounds(meta.rounds.xy).items[pass.round].volumes.w, blocks);
     atomicMax(Rounds(meta.rounds.xy).items[pass.round].volumes.y, workRows(firstItem + blocks));

@@ -60,7 +60,7 @@ struct MetavoxelSlot {
 BILLOW_GPU_SIZE(MetavoxelSlot, 32);
 
 struct MetavoxelCounters {
-  uvec4 wanted;  // occupied cells (more than fit are left out), list entries, the same; drawn cells; filled ones
+  uvec4 wanted;  // x: occupied cells, y: list entries (more than fit are left out), z: cells drawn, w: and filled
   uvec4 boxMin;  // largest of ~cell over drawn cells
   uvec4 boxMax;  // largest of cell + 1; w: number of the draw
   uvec4 reset;   // indirect dispatch of the next frame's clearing; w: 1 where everything is cleared

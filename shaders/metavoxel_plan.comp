@@ -54,7 +54,10 @@ void main() {
   const bool keep = hasFlag(kFlagKeep) && whole && items != 0u;
   counters.value.check = uvec4(keep ? items : 0u, 1u, 1u, 0u);
   counters.value.wanted.z = items;
-  counters.value.wanted.w = keep ? 0u : items;
+  // Planned again for the light field, what all fits is filled already; `round` says so.
+  const bool filled = pass.round != 0u && whole;
+  if (!filled) counters.value.wanted.w = keep ? 0u : items;
   counters.value.boxMax.w = meta.picture.z;
   planRounds(items, keep ? min(meta.pool.z, meta.pool.w) : 0u);
+  if (filled) Rounds(meta.rounds.xy).items[0].blocks.x = 0u;
 }

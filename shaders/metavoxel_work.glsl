@@ -1,5 +1,5 @@
 // Work items: what a workgroup of the fill passes writes, a block of texels of one metavoxel. The first word is the slot
-// above the block's place in it, three bits an axis; the second the cell's number; for particles follow the first and
+// above the block's place in it, three bits an axis, and kAfterVolumes at the top; the second the cell's number; for particles follow the first and
 // the count of the metavoxel's list.
 #ifndef BILLOW_METAVOXEL_WORK
 #define BILLOW_METAVOXEL_WORK

@@ -300,6 +300,28 @@ TEST_F(MetavoxelField, MetavoxelsThatStayFilledAreLitAlike) {
   }
 }
 
+// A pool that is smaller than maxMetavoxels but holds the draw: nothing is filled a second time for the field.
+TEST_F(MetavoxelField, WhatFitsIsFilledOnce) {
+  const std::vector<Particle> particles = burningCloud();
+  MetavoxelDraw draw = smallDraw();
+  draw.particles = particles;
+  const headless::Picture expected = renderOnce(fieldConfig(), draw);
+  for (const bool keep : {false, true}) {
+    draw.refill = keep ? runtime::Refill::changed : runtime::Refill::always;
+    MetavoxelConfig config = fieldConfig();
+    config.keepFilled = keep;
+    config.memoryBudget = std::uint64_t{14} << 20;
+    const auto metavoxels = make(config);
+    ASSERT_LT(metavoxels->poolSlots(), config.maxMetavoxels);
+    for (int again = 0; again < 2; ++again) {
+      EXPECT_GT(pictureDecibels(render(*metavoxels, draw), expected), 55);
+      const runtime::MetavoxelStats stats = metavoxels->stats();
+      ASSERT_LE(stats.drawn, metavoxels->poolSlots());
+      EXPECT_EQ(stats.filled, keep && again == 1 ? 0 : stats.drawn);
+    }
+  }
+}
+
 TEST_F(MetavoxelField, WhatIsBesideTheViewLightsWhatIsInIt) {
   // The ball is 30 voxels outside of a view of a mote; a second draw has forgotten the first.
   const std::vector<Particle> particles{glowing(ball({-3.5f, 0, 0}, 0.6f, 0.2f, kHard), 5),

@@ -207,5 +207,37 @@ TEST_F(MetavoxelVolumes, WeightedColoursAreMeans) {
   EXPECT_GT(seen, 500);
 }
 
+// In the same metavoxels, and in the same blocks of them: each adds its depth to the shadow.
+TEST_F(MetavoxelVolumes, VolumeAndParticlesAddUpInTheShadow) {
+  const format::Pack pack = openPack(cloudPack(false));
+  const auto frame = upload(*renderer_, pack);
+  const runtime::Look look = cloudLook();
+  const std::vector<MetavoxelVolume> volumes{{.frame = frame.get(), .look = look}};
+  std::vector<Particle> particles;
+  for (int i = 0; i < 64; ++i) {
+    const double at[3] = {(i % 4 - 1.5) * 0.8, (i / 4 % 4 - 1.5) * 0.8, (i / 16 - 1.5) * 0.8};
+    const auto place = [&](std::size_t axis) { return static_cast<float>(kMiddle + at[axis]); };
+    particles.push_back(ball({place(0), place(1), place(2)}, 0.7f, 0.5f));
+  }
+  const auto metavoxels = make(smallConfig());
+  const auto shadow = [&](bool cloud, bool puffs) {
+    MetavoxelDraw draw = cloudDraw(look);
+    draw.cull = false;
+    if (cloud) draw.volumes = volumes;
+    if (puffs) draw.particles = particles;
+    render(*metavoxels, draw);
+    return valueOf(gpu().readShadow(*renderer_, *metavoxels), "shadow");
+  };
+  const std::vector<float> cloud = shadow(true, false), puffs = shadow(false, true);
+  EXPECT_GT(*std::max_element(cloud.begin(), cloud.end()), 1.0f);
+  EXPECT_GT(*std::max_element(puffs.begin(), puffs.end()), 0.5f);
+  for (int again = 0; again < 4; ++again) {
+    const std::vector<float> both = shadow(true, true);
+    for (std::size_t i = 0; i < both.size(); ++i) {
+      ASSERT_NEAR(both[i], cloud[i] + puffs[i], 2e-3f * (1 + both[i])) << i;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace billow::tests

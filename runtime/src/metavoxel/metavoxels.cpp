@@ -134,9 +134,16 @@ class MetavoxelsImpl final : public Metavoxels {
     return {.weighted = draw.blend == Blend::weighted, .sceneShadow = draw.sceneShadow.view != VK_NULL_HANDLE};
   }
 
+  // Whether any draw may run the pass.
+  bool needed(MetavoxelPass pass) const {
+    using enum MetavoxelPass;
+    if (pass == spawn) return planner_.hasEffects();
+    return config_.lightField != 0 || (pass != inject && pass != pyramid && pass != gather);
+  }
+
   Result<void> makeAll(std::span<const std::pair<MetavoxelPass, VkPipeline*>> wanted, const PassVariant& variant) {
     for (const auto& [pass, place] : wanted) {
-      if (pass == MetavoxelPass::spawn && !planner_.hasEffects()) continue;
+      if (!needed(pass)) continue;
       const auto made = pipelines_.pipeline(pass, variant);
       if (!made) return tl::unexpected(made.error());
       *place = *made;

@@ -104,7 +104,7 @@ void DrawRecorder::rounds(const MetavoxelDraw& draw, const DrawSteps& steps) {
   }
   if (shining) field(draw, steps);
   if (shining && count > 1) {  // what there is to fill is counted anew
-    dispatch(steps.plan, {}, {1, 1, 1});
+    dispatch(steps.plan, {.round = 1}, {1, 1, 1});
     barrier();
   }
   for (std::uint32_t round = 0; round < count; ++round) {

@@ -121,6 +121,12 @@ void MetavoxelResources::addAddresses(gpu::MetavoxelParams& params) const {
 }
 
 Result<void> MetavoxelResources::create(const MetavoxelConfig& config) {
+  const std::size_t maps = config.tables != nullptr ? config.tables->maps.size() : 0;
+  if (maps > device_.maxImageExtent3D / gpu::kCubeLayers) {
+    return failure(ErrorCode::argument, "MetavoxelConfig: tables have " + std::to_string(maps) +
+                                            " cube maps; this device takes " +
+                                            std::to_string(device_.maxImageExtent3D / gpu::kCubeLayers));
+  }
   volumes_ = config.maxVolumes;
   hasRadii_ = config.tables != nullptr && format::haveRadii(config.tables->tracks);
   const std::uint64_t particleBytes = std::uint64_t{config.maxParticles} * sizeof(format::Particle);

@@ -32,7 +32,8 @@ struct MetavoxelConfig {
   std::uint32_t maxListEntries = 1u << 20;  // particles in metavoxels' lists, all together; further ones are left out
   std::uint32_t maxVolumes = 4;             // of a draw, 0 to 8
   // Voxels along each axis of the space's light field, which Scattering::surroundings needs: `metavoxels` to 160, or 0,
-  // none. They span 8 of the space's voxels or fewer where there is room for so many, else more. Each takes 22 bytes.
+  // none. They span 8 of the space's voxels or fewer where there is room for so many, else more. Each takes 22 bytes,
+  // and 16 more for each of its voxels that an occupied metavoxel may have.
   std::uint32_t lightField = 0;
   std::uint32_t recordsInFlight = 3;  // record() calls whose commands may be pending at once, at least 1
   bool keepFilled = false;  // metavoxels stay filled from draw to draw, for MetavoxelDraw::refill: 4 bytes more a texel
