@@ -116,9 +116,9 @@ struct MetavoxelParams {
   vec4 mapZ;       // voxel z = dot(xyz, (value, voxel x, voxel y)) + w
   // Two a volume: hash of all that its matter depends on.
   uvec4 contents[kMaxVolumes / 2u];
-  uvec4 field;    // light field: its voxels along an axis of the space, of a cell; levels of its pyramid; 0
-  vec4 fieldScale;             // edge of its voxels in those of the space; share of its light that counts; 0, 0
-  uvec4 fieldMatter;           // address: what its voxels hold, by position; 0, 0
+  uvec4 field;        // light field: its voxels along an axis of the space, of a cell; levels of its pyramid; 0
+  vec4 fieldScale;    // edge of its voxels in those of the space; share of its light that counts; 0, 0
+  uvec4 fieldMatter;  // address: what its voxels hold, by position; 0, 0
   ivec4 levels[kFieldLevels];  // of the pyramid: first texel in its image, edge
 };
 BILLOW_GPU_SIZE(MetavoxelParams, 52 * 16);
