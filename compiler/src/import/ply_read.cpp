@@ -185,7 +185,7 @@ double linearOf(double value, PlyType type) {
 class PlyReader {
  public:
   PlyReader(const PlyElement& element, const std::string& what, const PointAttributes& attributes)
-      : element_(element), what_(what), attributes_(attributes) {
+      : element_(element), what_(what) {
     place_ = propertiesOf(element, "", {"x", "y", "z"});
     if (place_[0] == kNone) {
       throw Error(Fault::input, fmt::format("{}: its vertices have no properties x, y and z", what));
@@ -254,7 +254,6 @@ class PlyReader {
 
   const PlyElement& element_;
   const std::string& what_;
-  const PointAttributes& attributes_;
   Three place_, colour_;
   std::size_t id_, radius_, age_, life_;
 };
