@@ -7,12 +7,12 @@
 #include "billow/format/effect.h"
 #include "billow/format/exact_math.h"
 #include "billow/format/noise.h"
+#include "quaternion.h"
 
 namespace billow::format {
 namespace {
 
 using Vec3 = std::array<double, 3>;
-using Quaternion = std::array<double, 4>;  // x y z w
 
 // The random numbers of one particle.
 class Dice {
@@ -59,11 +59,6 @@ Vec3 around(const Vec3& axis, const Vec3& v) {
 Quaternion turned(const Vec3& axis, double turns) {
   const SineCosine half = sineCosine(turns / 2);
   return {axis[0] * half.sine, axis[1] * half.sine, axis[2] * half.sine, half.cosine};
-}
-
-Quaternion product(const Quaternion& a, const Quaternion& b) {
-  return {a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1], a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
-          a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3], a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]};
 }
 
 // The shortest turn of the x axis to the velocity's direction; none where it is at rest.

@@ -4,11 +4,12 @@
 #include <cmath>
 #include <cstddef>
 
+#include "quaternion.h"
+
 namespace billow::format {
 namespace {
 
 using Vec3 = std::array<double, 3>;
-using Quaternion = std::array<double, 4>;
 
 constexpr double kTolerance = 1e-4;
 constexpr double kMinScale = 1e-6, kMaxScale = 1e6;
@@ -19,11 +20,6 @@ double dot(const Vec3& a, const Vec3& b) {
 
 Vec3 cross(const Vec3& a, const Vec3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
-Quaternion product(const Quaternion& a, const Quaternion& b) {
-  return {a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1], a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
-          a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3], a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]};
 }
 
 // The quaternion's component that is largest is found first, so that nothing is divided by little.

@@ -6,6 +6,7 @@
 
 #include "import/points.h"
 #include "ply_file.h"
+#include "point_attributes.h"
 #include "stages.h"
 
 namespace billow {
@@ -15,21 +16,12 @@ using namespace compiler;
 using tests::PlyColumn;
 using tests::plyText;
 
-PointAttributes usual() {
-  PointAttributes attributes;
-  attributes.id = {{"id"}, false};
-  attributes.radius = {{"pscale", "radius"}, false};
-  attributes.age = {{"age"}, false};
-  attributes.life = {{"life"}, false};
-  attributes.colour = {{"", "Cd"}, false};
-  return attributes;
-}
-
-PointFrame read(const std::string& text, const PointAttributes& attributes = usual(), std::uint32_t most = 100) {
+PointFrame read(const std::string& text, const PointAttributes& attributes = tests::usualAttributes(),
+                std::uint32_t most = 100) {
   return readPly(std::as_bytes(std::span(text)), "test.ply", attributes, most);
 }
 
-std::string errorOf(const std::string& text, const PointAttributes& attributes = usual()) {
+std::string errorOf(const std::string& text, const PointAttributes& attributes = tests::usualAttributes()) {
   try {
     read(text, attributes);
   } catch (const Error& error) {
@@ -98,11 +90,11 @@ TEST(Ply, ColoursHaveManyNames) {
 }
 
 TEST(Ply, WhatIsNotThereIsSaid) {
-  PointAttributes attributes = usual();
+  PointAttributes attributes = tests::usualAttributes();
   attributes.radius = {{"size"}, true};
   const std::string error = errorOf(plyText("ascii", columns()), attributes);
   EXPECT_NE(error.find("no attribute 'size' of a fitting type; there is: z, x, unknown"), std::string::npos) << error;
-  attributes = usual();
+  attributes = tests::usualAttributes();
   attributes.colour = {{"paint"}, true};
   EXPECT_NE(errorOf(plyText("ascii", columns()), attributes).find("'paint'"), std::string::npos);
   std::vector<PlyColumn> flat = columns();

@@ -13,6 +13,7 @@
 #include "effect/read.h"
 #include "import/points.h"
 #include "planned.h"
+#include "point_attributes.h"
 #include "stages.h"
 #include "unit/run_command.h"
 
@@ -23,16 +24,6 @@ using namespace tests;
 using openvdb::points::AttributeHandle;
 using openvdb::points::AttributeWriteHandle;
 using openvdb::points::PointDataGrid;
-
-PointAttributes usual() {
-  PointAttributes attributes;
-  attributes.id = {{"id"}, false};
-  attributes.radius = {{"pscale", "radius"}, false};
-  attributes.age = {{"age"}, false};
-  attributes.life = {{"life"}, false};
-  attributes.colour = {{"", "Cd"}, false};
-  return attributes;
-}
 
 struct Point {
   std::int64_t id;
@@ -127,12 +118,12 @@ TEST(VdbPoints, ComeBackFromEveryCompression) {
              fine = pointGrid<FixedPointCodec<false>>(points, "a");
   for (const std::uint32_t compression : {0u, 1u, 2u, 4u, 6u}) {
     write(folder / "p.vdb", {exact}, compression);
-    expectCloud(readPoints(folder / "p.vdb", 1, usual(), 65536), points, 1e-5f);
+    expectCloud(readPoints(folder / "p.vdb", 1, tests::usualAttributes(), 65536), points, 1e-5f);
   }
   write(folder / "p.vdb", {coarse});
-  expectCloud(readPoints(folder / "p.vdb", 1, usual(), 65536), points, 0.25f / 255 + 1e-5f);
+  expectCloud(readPoints(folder / "p.vdb", 1, tests::usualAttributes(), 65536), points, 0.25f / 255 + 1e-5f);
   write(folder / "p.vdb", {fine});
-  expectCloud(readPoints(folder / "p.vdb", 1, usual(), 65536), points, 0.25f / 65535 + 1e-5f);
+  expectCloud(readPoints(folder / "p.vdb", 1, tests::usualAttributes(), 65536), points, 0.25f / 65535 + 1e-5f);
 }
 
 TEST(VdbPoints, OfSeveralGridsAllOrTheAskedFor) {
@@ -144,8 +135,8 @@ TEST(VdbPoints, OfSeveralGridsAllOrTheAskedFor) {
   density->tree().setValue({1, 2, 3}, 4);
   write(folder / "p.vdb", {pointGrid<openvdb::points::NullCodec>(first, "dust"), density,
                            pointGrid<openvdb::points::NullCodec>(second, "sparks")});
-  expectCloud(readPoints(folder / "p.vdb", 1, usual(), 900), points, 1e-5f);
-  PointAttributes attributes = usual();
+  expectCloud(readPoints(folder / "p.vdb", 1, tests::usualAttributes(), 900), points, 1e-5f);
+  PointAttributes attributes = tests::usualAttributes();
   attributes.grids = {"sparks"};
   expectCloud(readPoints(folder / "p.vdb", 1, attributes, 900), second, 1e-5f);
   const auto errorOf = [&](std::uint32_t most) {
@@ -172,7 +163,7 @@ TEST(VdbPoints, OfARealFile) {
   const char* data = std::getenv("BILLOW_DATA");
   const std::string path = std::string(data == nullptr ? "" : data) + "/edge/type_points.vdb";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no test data";
-  const PointFrame frame = readPoints(path, 0, usual(), 1u << 20);
+  const PointFrame frame = readPoints(path, 0, tests::usualAttributes(), 1u << 20);
   openvdb::initialize();
   openvdb::io::File file(path);
   file.open(false);
@@ -234,7 +225,7 @@ TEST(VdbPoints, DriveAnEffectByTheirIds) {
 // Damage is refused in a line that names the file, or does not matter.
 void readDamaged(const std::string& path) {
   try {
-    const PointFrame frame = readPoints(path, 1, usual(), 4096);
+    const PointFrame frame = readPoints(path, 1, tests::usualAttributes(), 4096);
     EXPECT_LE(frame.places.size(), 4096u);
     EXPECT_TRUE(frame.ids.empty() || frame.ids.size() == frame.places.size());
   } catch (const Error& error) {
@@ -252,7 +243,7 @@ TEST(VdbPoints, DamageDoesNoHarm) {
     const std::string whole = readFile(folder / "p.vdb");
     for (std::size_t size = 0; size < whole.size(); size += size < 1500 ? 7 : 701) {
       std::ofstream(path, std::ios::binary) << whole.substr(0, size);
-      EXPECT_THROW(readPoints(path, 1, usual(), 4096), Error) << size;
+      EXPECT_THROW(readPoints(path, 1, tests::usualAttributes(), 4096), Error) << size;
     }
     for (int round = 0; round < 300; ++round) {
       std::string bytes = whole;
