@@ -111,6 +111,13 @@ class Frame {
   virtual bool empty() const = 0;
 };
 
+// What is drawn of a volume at one moment: frames whose weights sum to 1.
+struct Layer {
+  const Frame* frame = nullptr;
+  float weight = 1;  // of its extinction and emission, in [0, 1]
+  float advect = 0;  // seconds that it is carried along its velocity grids, forward or back in time; 0: as it is
+};
+
 // A pinhole camera in world space, all finite. `right`, `up` and `forward` are orthonormal.
 struct View {
   std::array<double, 3> eye{0, 0, 0};
@@ -222,6 +229,7 @@ class Renderer {
  private:
   friend class Metavoxels;  // metavoxel.h
   friend class Compositor;  // composite.h
+  friend class Streamer;    // stream.h
   virtual Device& device() = 0;
 };
 
