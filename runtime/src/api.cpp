@@ -12,6 +12,14 @@ tl::unexpected<Error> vulkanError(const char* call, VkResult result) {
   return failure(ErrorCode::vulkan, std::string(call) + " failed with VkResult " + std::to_string(result));
 }
 
+bool takeBytes(Device& device, std::uint64_t bytes) {
+  std::uint64_t used = device.used;
+  do {
+    if (bytes > device.budget - used) return false;
+  } while (!device.used.compare_exchange_weak(used, used + bytes));
+  return true;
+}
+
 Result<Api> loadApi(const HostDevice& host) {
   Api api;
 #define BILLOW_LOAD(name)                                                                  \
@@ -23,6 +31,9 @@ Result<Api> loadApi(const HostDevice& host) {
   api.name = reinterpret_cast<PFN_##name>(api.vkGetDeviceProcAddr(host.device, #name)); \
   if (api.name == nullptr) return failure(ErrorCode::unsupported, "the Vulkan device lacks " #name);
   BILLOW_DEVICE_FUNCTIONS(BILLOW_LOAD)
+#undef BILLOW_LOAD
+#define BILLOW_LOAD(name) api.name = reinterpret_cast<PFN_##name>(host.getInstanceProcAddr(host.instance, #name));
+  BILLOW_DEBUG_FUNCTIONS(BILLOW_LOAD)
 #undef BILLOW_LOAD
   return api;
 }

@@ -4,6 +4,7 @@
 
 #include <vulkan/vulkan_core.h>
 
+#include <atomic>
 #include <string>
 
 #include "billow/runtime/runtime.h"
@@ -66,12 +67,20 @@ namespace billow::runtime {
   X(vkGetSemaphoreCounterValue)    \
   X(vkMapMemory)                   \
   X(vkQueueSubmit2)                \
-  X(vkUpdateDescriptorSets)
+  X(vkUpdateDescriptorSets)        \
+  X(vkWaitSemaphores)
+
+// Null where the host's instance does not have VK_EXT_debug_utils enabled.
+#define BILLOW_DEBUG_FUNCTIONS(X) \
+  X(vkCmdBeginDebugUtilsLabelEXT) \
+  X(vkCmdEndDebugUtilsLabelEXT)   \
+  X(vkSetDebugUtilsObjectNameEXT)
 
 struct Api {
 #define BILLOW_DECLARE(name) PFN_##name name = nullptr;
   BILLOW_INSTANCE_FUNCTIONS(BILLOW_DECLARE)
   BILLOW_DEVICE_FUNCTIONS(BILLOW_DECLARE)
+  BILLOW_DEBUG_FUNCTIONS(BILLOW_DECLARE)
 #undef BILLOW_DECLARE
 };
 
@@ -86,16 +95,21 @@ Info begin(VkStructureType type) {
   return info;
 }
 
-// What every object of the runtime needs.
+// What every object of the runtime needs. Streaming allocates on other threads than those that record.
 struct Device {
   HostDevice host;
   Api api;
   VkPhysicalDeviceMemoryProperties memory{};
   std::uint32_t maxImageExtent3D = 0;
+  std::uint64_t imageGranularity = 1;  // bytes between a buffer and an image in one memory
   std::uint64_t budget = 0;
-  std::uint64_t used = 0;
+  std::atomic<std::uint64_t> used = 0;
+  std::atomic<std::uint64_t> frames = 0;  // that were made: each has a number of its own
   bool bc7 = false;  // BC7 bricks stay BC7, in a sampled 3D image; else they are decoded to uniform bricks of 8 bits
 };
+
+// Counts bytes as used, or returns false where they would exceed the budget.
+bool takeBytes(Device& device, std::uint64_t bytes);
 
 tl::unexpected<Error> vulkanError(const char* call, VkResult result);
 tl::unexpected<Error> failure(ErrorCode code, std::string message);

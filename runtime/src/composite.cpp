@@ -6,6 +6,7 @@
 
 #include "checks.h"
 #include "compute_pipeline.h"
+#include "debug.h"
 #include "spirv.h"
 
 namespace billow::runtime {
@@ -44,11 +45,13 @@ class CompositorImpl final : public Compositor {
   ~CompositorImpl() override {
     const VkDevice device = device_.host.device;
     for (const VkPipeline pipeline : pipelines_) {
-      if (pipeline != VK_NULL_HANDLE) device_.api.vkDestroyPipeline(device, pipeline, nullptr);
+      if (pipeline != VK_NULL_HANDLE) device_.api.vkDestroyPipeline(device, pipeline, device_.host.allocationCallbacks);
     }
-    if (pool_ != VK_NULL_HANDLE) device_.api.vkDestroyDescriptorPool(device, pool_, nullptr);
-    if (layout_ != VK_NULL_HANDLE) device_.api.vkDestroyPipelineLayout(device, layout_, nullptr);
-    if (setLayout_ != VK_NULL_HANDLE) device_.api.vkDestroyDescriptorSetLayout(device, setLayout_, nullptr);
+    if (pool_ != VK_NULL_HANDLE) device_.api.vkDestroyDescriptorPool(device, pool_, device_.host.allocationCallbacks);
+    if (layout_ != VK_NULL_HANDLE)
+      device_.api.vkDestroyPipelineLayout(device, layout_, device_.host.allocationCallbacks);
+    if (setLayout_ != VK_NULL_HANDLE)
+      device_.api.vkDestroyDescriptorSetLayout(device, setLayout_, device_.host.allocationCallbacks);
   }
 
   Result<void> initialise() {
@@ -70,6 +73,7 @@ class CompositorImpl final : public Compositor {
                       .targetSize = {draw.targetWidth, draw.targetHeight},
                       .marchedToScene = draw.sceneDepth != VK_NULL_HANDLE ? 1u : 0u};
       const auto& api = device_.api;
+      const DebugLabel label(api, commands, "billow composite");
       api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, *made);
       api.vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout_, 0, 1, &set, 0, nullptr);
       api.vkCmdPushConstants(commands, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(push), &push);
@@ -87,7 +91,8 @@ class CompositorImpl final : public Compositor {
     auto setInfo = begin<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
     setInfo.bindingCount = kBindings;
     setInfo.pBindings = bindings.data();
-    VkResult result = device_.api.vkCreateDescriptorSetLayout(device_.host.device, &setInfo, nullptr, &setLayout_);
+    VkResult result = device_.api.vkCreateDescriptorSetLayout(device_.host.device, &setInfo,
+                                                              device_.host.allocationCallbacks, &setLayout_);
     if (result != VK_SUCCESS) return vulkanError("vkCreateDescriptorSetLayout", result);
     const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(Push)};
     auto info = begin<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
@@ -95,7 +100,7 @@ class CompositorImpl final : public Compositor {
     info.pSetLayouts = &setLayout_;
     info.pushConstantRangeCount = 1;
     info.pPushConstantRanges = &range;
-    result = device_.api.vkCreatePipelineLayout(device_.host.device, &info, nullptr, &layout_);
+    result = device_.api.vkCreatePipelineLayout(device_.host.device, &info, device_.host.allocationCallbacks, &layout_);
     if (result != VK_SUCCESS) return vulkanError("vkCreatePipelineLayout", result);
     return {};
   }
@@ -107,7 +112,8 @@ class CompositorImpl final : public Compositor {
     poolInfo.maxSets = count;
     poolInfo.poolSizeCount = 1;
     poolInfo.pPoolSizes = &size;
-    VkResult result = device_.api.vkCreateDescriptorPool(device_.host.device, &poolInfo, nullptr, &pool_);
+    VkResult result =
+        device_.api.vkCreateDescriptorPool(device_.host.device, &poolInfo, device_.host.allocationCallbacks, &pool_);
     if (result != VK_SUCCESS) return vulkanError("vkCreateDescriptorPool", result);
     const std::vector<VkDescriptorSetLayout> layouts(count, setLayout_);
     auto info = begin<VkDescriptorSetAllocateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO);

@@ -14,7 +14,8 @@ Result<VkPipeline> makeComputePipeline(const Device& device, VkPipelineLayout la
   moduleInfo.codeSize = code.size_bytes();
   moduleInfo.pCode = code.data();
   VkShaderModule module = VK_NULL_HANDLE;
-  VkResult result = device.api.vkCreateShaderModule(device.host.device, &moduleInfo, nullptr, &module);
+  VkResult result =
+      device.api.vkCreateShaderModule(device.host.device, &moduleInfo, device.host.allocationCallbacks, &module);
   if (result != VK_SUCCESS) return vulkanError("vkCreateShaderModule", result);
   auto info = begin<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
   info.stage = begin<VkPipelineShaderStageCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO);
@@ -24,9 +25,9 @@ Result<VkPipeline> makeComputePipeline(const Device& device, VkPipelineLayout la
   info.stage.pSpecializationInfo = &specialization;
   info.layout = layout;
   VkPipeline pipeline = VK_NULL_HANDLE;
-  result =
-      device.api.vkCreateComputePipelines(device.host.device, device.host.pipelineCache, 1, &info, nullptr, &pipeline);
-  device.api.vkDestroyShaderModule(device.host.device, module, nullptr);
+  result = device.api.vkCreateComputePipelines(device.host.device, device.host.pipelineCache, 1, &info,
+                                               device.host.allocationCallbacks, &pipeline);
+  device.api.vkDestroyShaderModule(device.host.device, module, device.host.allocationCallbacks);
   if (result != VK_SUCCESS) return vulkanError("vkCreateComputePipelines", result);
   return pipeline;
 }

@@ -107,19 +107,22 @@ void fillStaging(const StagedFrame& staged, const FrameObjects& objects) {
 
 Result<void> createObjects(Device& device, const StagedFrame& staged, FrameObjects& objects) {
   ResidentFrame& frame = *objects.frame;
+  auto memory = std::make_unique<OwnMemory>();
+  objects.memory = memory.get();
+  frame.memory_ = std::move(memory);
+  objects.bufferBytes = staged.bufferBytes;
   const std::uint64_t bufferBytes = std::max<std::uint64_t>(staged.bufferBytes, kSectionAlign);
   auto buffer = Buffer::make(device, bufferBytes,
                              VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
                                  VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT);
   if (!buffer) return tl::unexpected(buffer.error());
-  frame.buffer_ = std::move(*buffer);
-  frame.bufferBytes_ = staged.bufferBytes;
-  frame.stats_.allocatedBytes = frame.buffer_.allocationSize();
+  objects.memory->buffer = std::move(*buffer);
+  frame.stats_.allocatedBytes = objects.memory->buffer.allocationSize();
   frame.shape_ = staged.shape;
   auto image = Image::make(device, {.format = staged.shape.format(), .extent = staged.shape.extent()});
   if (!image) return tl::unexpected(image.error());
-  frame.atlas_ = std::move(*image);
-  frame.stats_.allocatedBytes += frame.atlas_.allocationSize();
+  objects.memory->atlas = std::move(*image);
+  frame.stats_.allocatedBytes += objects.memory->atlas.allocationSize();
   objects.atlasOffset = aligned(bufferBytes);
   auto staging = Buffer::make(device, objects.atlasOffset + staged.shape.bytes(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
   if (!staging) return tl::unexpected(staging.error());
@@ -137,8 +140,8 @@ Result<void> checkBudget(const Device& device, const FrameObjects& objects) {
 }
 
 Result<void> bindObjects(FrameObjects& objects) {
-  if (auto bound = objects.frame->buffer_.bind(Placement::device); !bound) return bound;
-  if (auto bound = objects.frame->atlas_.bind(); !bound) return bound;
+  if (auto bound = objects.memory->buffer.bind(Placement::device); !bound) return bound;
+  if (auto bound = objects.memory->atlas.bind(); !bound) return bound;
   return objects.staging.bind(Placement::mapped);
 }
 
@@ -210,7 +213,9 @@ Result<FrameObjects> makeFrameObjects(Device& device, const StagedFrame& staged)
   if (auto made = createObjects(device, staged, objects); !made) return tl::unexpected(made.error());
   if (auto fits = checkBudget(device, objects); !fits) return tl::unexpected(fits.error());
   if (auto bound = bindObjects(objects); !bound) return tl::unexpected(bound.error());
-  objects.frame->bricks_ = objects.frame->buffer_.address();
+  objects.frame->number_ = ++device.frames;
+  objects.frame->bricks_ = objects.memory->buffer.address();
+  objects.frame->atlas_ = objects.memory->atlas.view();
   VkDeviceAddress at = objects.frame->bricks_ + bufferBrickBytes(staged);
   for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
     if (staged.grids[slot]) objects.frame->grids_[slot] = describe(*staged.grids[slot], at);

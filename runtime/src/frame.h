@@ -3,6 +3,7 @@
 #define BILLOW_RUNTIME_FRAME_H
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -27,6 +28,13 @@ struct ResidentGrid {
 // By slot: the index of each grid that the frame has; pipelines are made for it.
 using FrameIndices = std::array<std::optional<Index>, gpu::kGridSlots>;
 
+// What a frame's bytes lie in; given back when it is destroyed.
+class FrameMemory {
+ public:
+  virtual ~FrameMemory() = default;
+};
+
+// A frame as draws read it, whoever owns its memory.
 class ResidentFrame final : public Frame {
  public:
   const FrameStats& stats() const override { return stats_; }
@@ -36,14 +44,21 @@ class ResidentFrame final : public Frame {
 
   FrameStats stats_;
   std::uint64_t uploadValue_ = 0;
+  std::uint64_t number_ = 0;  // no other frame's of this device: memory is given to one frame after another
   std::array<ResidentGrid, gpu::kGridSlots> grids_;
-  // Bricks that are not BC7, then tables, records and masks of all grids: a shader that reads a word past the last
-  // brick stays inside.
-  Buffer buffer_;
-  std::uint64_t bufferBytes_ = 0;  // of it that are copied from staging
-  VkDeviceAddress bricks_ = 0;     // where buffer_ begins
-  Image atlas_;
+  // Where its bytes begin: bricks that are not BC7, then tables, records and masks of all grids. So a shader that reads
+  // a word past the last brick stays inside.
+  VkDeviceAddress bricks_ = 0;
+  VkImageView atlas_ = VK_NULL_HANDLE;
   AtlasShape shape_;
+  std::unique_ptr<FrameMemory> memory_;
+};
+
+// Memory of one frame alone.
+class OwnMemory final : public FrameMemory {
+ public:
+  Buffer buffer;
+  Image atlas;
 };
 
 // A frame on the CPU: what will be copied, with the views that its bricks point into.
@@ -67,6 +82,8 @@ Result<StagedFrame> stageFrame(const Device& device, const format::Pack& pack, s
 // staging memory: the buffer's bytes, and from `atlasOffset` on the atlas's.
 struct FrameObjects {
   std::unique_ptr<ResidentFrame> frame;
+  OwnMemory* memory = nullptr;  // the frame's
+  std::uint64_t bufferBytes = 0;
   Buffer staging;
   std::uint64_t atlasOffset = 0;
 };

@@ -5,22 +5,14 @@
 namespace billow::runtime {
 namespace {
 
-Result<std::uint32_t> memoryType(const Device& device, std::uint32_t allowed, VkMemoryPropertyFlags wanted) {
-  for (std::uint32_t i = 0; i < device.memory.memoryTypeCount; ++i) {
-    const bool fits = (device.memory.memoryTypes[i].propertyFlags & wanted) == wanted;
-    if (fits && (allowed >> i & 1u) != 0) return i;
-  }
-  return failure(ErrorCode::unsupported, "the device has no memory of the kind that a buffer or image needs");
-}
-
 Result<VkDeviceMemory> allocate(Device& device, const VkMemoryRequirements& requirements, VkMemoryPropertyFlags wanted,
                                 bool addressable) {
-  if (requirements.size > device.budget - device.used) {
+  const auto type = memoryType(device, requirements.memoryTypeBits, wanted);
+  if (!type) return tl::unexpected(type.error());
+  if (!takeBytes(device, requirements.size)) {
     return failure(ErrorCode::budget, "an allocation of " + std::to_string(requirements.size) +
                                           " bytes would exceed the GPU budget of " + std::to_string(device.budget));
   }
-  const auto type = memoryType(device, requirements.memoryTypeBits, wanted);
-  if (!type) return tl::unexpected(type.error());
   auto flags = begin<VkMemoryAllocateFlagsInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO);
   flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
   auto info = begin<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
@@ -28,24 +20,22 @@ Result<VkDeviceMemory> allocate(Device& device, const VkMemoryRequirements& requ
   info.allocationSize = requirements.size;
   info.memoryTypeIndex = *type;
   VkDeviceMemory memory = VK_NULL_HANDLE;
-  const VkResult result = device.api.vkAllocateMemory(device.host.device, &info, nullptr, &memory);
-  if (result != VK_SUCCESS) return vulkanError("vkAllocateMemory", result);
-  device.used += requirements.size;
-  return memory;
-}
-
-// Sharing between the upload and the draw family.
-template <class Info>
-void shareFamilies(const Device& device, Info& info, std::uint32_t (&families)[2]) {
-  families[0] = device.host.uploadFamily;
-  families[1] = device.host.drawFamily;
-  if (families[0] == families[1]) return;
-  info.sharingMode = VK_SHARING_MODE_CONCURRENT;
-  info.queueFamilyIndexCount = 2;
-  info.pQueueFamilyIndices = families;
+  const VkResult result =
+      device.api.vkAllocateMemory(device.host.device, &info, device.host.allocationCallbacks, &memory);
+  if (result == VK_SUCCESS) return memory;
+  device.used -= requirements.size;
+  return vulkanError("vkAllocateMemory", result);
 }
 
 }  // namespace
+
+Result<std::uint32_t> memoryType(const Device& device, std::uint32_t allowed, VkMemoryPropertyFlags wanted) {
+  for (std::uint32_t i = 0; i < device.memory.memoryTypeCount; ++i) {
+    const bool fits = (device.memory.memoryTypes[i].propertyFlags & wanted) == wanted;
+    if (fits && (allowed >> i & 1u) != 0) return i;
+  }
+  return failure(ErrorCode::unsupported, "the device has no memory of the kind that a buffer or image needs");
+}
 
 Buffer& Buffer::operator=(Buffer&& other) noexcept {
   if (this == &other) return *this;
@@ -70,7 +60,8 @@ Result<Buffer> Buffer::make(Device& device, std::uint64_t size, VkBufferUsageFla
   info.usage = usage;
   std::uint32_t families[2];
   shareFamilies(device, info, families);
-  const VkResult result = device.api.vkCreateBuffer(device.host.device, &info, nullptr, &buffer.buffer_);
+  const VkResult result =
+      device.api.vkCreateBuffer(device.host.device, &info, device.host.allocationCallbacks, &buffer.buffer_);
   if (result != VK_SUCCESS) return vulkanError("vkCreateBuffer", result);
   device.api.vkGetBufferMemoryRequirements(device.host.device, buffer.buffer_, &buffer.requirements_);
   return buffer;
@@ -96,9 +87,10 @@ Result<void> Buffer::bind(Placement placement) {
 
 void Buffer::reset() {
   if (device_ == nullptr) return;
-  if (buffer_ != VK_NULL_HANDLE) device_->api.vkDestroyBuffer(device_->host.device, buffer_, nullptr);
+  if (buffer_ != VK_NULL_HANDLE)
+    device_->api.vkDestroyBuffer(device_->host.device, buffer_, device_->host.allocationCallbacks);
   if (memory_ != VK_NULL_HANDLE) {
-    device_->api.vkFreeMemory(device_->host.device, memory_, nullptr);
+    device_->api.vkFreeMemory(device_->host.device, memory_, device_->host.allocationCallbacks);
     device_->used -= requirements_.size;
   }
   buffer_ = VK_NULL_HANDLE;
@@ -141,7 +133,8 @@ Result<Image> Image::make(Device& device, const ImageShape& shape) {
   info.initialLayout = VK_IMAGE_LAYOUT_UNDEFINED;
   std::uint32_t families[2];
   shareFamilies(device, info, families);
-  const VkResult result = device.api.vkCreateImage(device.host.device, &info, nullptr, &image.image_);
+  const VkResult result =
+      device.api.vkCreateImage(device.host.device, &info, device.host.allocationCallbacks, &image.image_);
   if (result != VK_SUCCESS) return vulkanError("vkCreateImage", result);
   device.api.vkGetImageMemoryRequirements(device.host.device, image.image_, &image.requirements_);
   return image;
@@ -159,7 +152,7 @@ Result<void> Image::bind() {
   info.viewType = shape_.type == VK_IMAGE_TYPE_3D ? VK_IMAGE_VIEW_TYPE_3D : VK_IMAGE_VIEW_TYPE_2D;
   info.format = shape_.format;
   info.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
-  result = device_->api.vkCreateImageView(device, &info, nullptr, &view_);
+  result = device_->api.vkCreateImageView(device, &info, device_->host.allocationCallbacks, &view_);
   if (result != VK_SUCCESS) return vulkanError("vkCreateImageView", result);
   return {};
 }
@@ -167,10 +160,10 @@ Result<void> Image::bind() {
 void Image::reset() {
   if (device_ == nullptr) return;
   const VkDevice device = device_->host.device;
-  if (view_ != VK_NULL_HANDLE) device_->api.vkDestroyImageView(device, view_, nullptr);
-  if (image_ != VK_NULL_HANDLE) device_->api.vkDestroyImage(device, image_, nullptr);
+  if (view_ != VK_NULL_HANDLE) device_->api.vkDestroyImageView(device, view_, device_->host.allocationCallbacks);
+  if (image_ != VK_NULL_HANDLE) device_->api.vkDestroyImage(device, image_, device_->host.allocationCallbacks);
   if (memory_ != VK_NULL_HANDLE) {
-    device_->api.vkFreeMemory(device, memory_, nullptr);
+    device_->api.vkFreeMemory(device, memory_, device_->host.allocationCallbacks);
     device_->used -= requirements_.size;
   }
   image_ = VK_NULL_HANDLE;

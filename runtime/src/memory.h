@@ -11,6 +11,20 @@ namespace billow::runtime {
 
 enum class Placement { device, mapped };
 
+// The first memory type of `allowed` (a bit each) that has all properties `wanted`.
+Result<std::uint32_t> memoryType(const Device& device, std::uint32_t allowed, VkMemoryPropertyFlags wanted);
+
+// Shares a buffer or image between the upload and the draw family; `families` lives until it is created.
+template <class Info>
+void shareFamilies(const Device& device, Info& info, std::uint32_t (&families)[2]) {
+  families[0] = device.host.uploadFamily;
+  families[1] = device.host.drawFamily;
+  if (families[0] == families[1]) return;
+  info.sharingMode = VK_SHARING_MODE_CONCURRENT;
+  info.queueFamilyIndexCount = 2;
+  info.pQueueFamilyIndices = families;
+}
+
 // An object is created first, which tells its size; bind() then allocates. So a frame is checked against the budget
 // before anything is allocated.
 class Buffer {

@@ -45,10 +45,13 @@ PassKey passKey(const FrameIndices& indices, Shader shader, Filter filter, Filte
 
 Passes::~Passes() {
   const VkDevice device = device_.host.device;
-  for (const auto& [key, pipeline] : pipelines_) device_.api.vkDestroyPipeline(device, pipeline, nullptr);
-  if (pool_ != VK_NULL_HANDLE) device_.api.vkDestroyDescriptorPool(device, pool_, nullptr);
-  if (pipelineLayout_ != VK_NULL_HANDLE) device_.api.vkDestroyPipelineLayout(device, pipelineLayout_, nullptr);
-  if (setLayout_ != VK_NULL_HANDLE) device_.api.vkDestroyDescriptorSetLayout(device, setLayout_, nullptr);
+  for (const auto& [key, pipeline] : pipelines_)
+    device_.api.vkDestroyPipeline(device, pipeline, device_.host.allocationCallbacks);
+  if (pool_ != VK_NULL_HANDLE) device_.api.vkDestroyDescriptorPool(device, pool_, device_.host.allocationCallbacks);
+  if (pipelineLayout_ != VK_NULL_HANDLE)
+    device_.api.vkDestroyPipelineLayout(device, pipelineLayout_, device_.host.allocationCallbacks);
+  if (setLayout_ != VK_NULL_HANDLE)
+    device_.api.vkDestroyDescriptorSetLayout(device, setLayout_, device_.host.allocationCallbacks);
 }
 
 Result<void> Passes::create() {
@@ -68,7 +71,8 @@ Result<void> Passes::createLayouts() {
   auto setInfo = begin<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
   setInfo.bindingCount = kBindings;
   setInfo.pBindings = bindings.data();
-  VkResult result = device_.api.vkCreateDescriptorSetLayout(device_.host.device, &setInfo, nullptr, &setLayout_);
+  VkResult result = device_.api.vkCreateDescriptorSetLayout(device_.host.device, &setInfo,
+                                                            device_.host.allocationCallbacks, &setLayout_);
   if (result != VK_SUCCESS) return vulkanError("vkCreateDescriptorSetLayout", result);
   const VkPushConstantRange push{VK_SHADER_STAGE_COMPUTE_BIT, 0, kPushBytes};
   auto info = begin<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
@@ -76,7 +80,8 @@ Result<void> Passes::createLayouts() {
   info.pSetLayouts = &setLayout_;
   info.pushConstantRangeCount = 1;
   info.pPushConstantRanges = &push;
-  result = device_.api.vkCreatePipelineLayout(device_.host.device, &info, nullptr, &pipelineLayout_);
+  result = device_.api.vkCreatePipelineLayout(device_.host.device, &info, device_.host.allocationCallbacks,
+                                              &pipelineLayout_);
   if (result != VK_SUCCESS) return vulkanError("vkCreatePipelineLayout", result);
   return {};
 }
@@ -89,7 +94,8 @@ Result<void> Passes::createSets() {
   poolInfo.maxSets = inFlight_;
   poolInfo.poolSizeCount = 3;
   poolInfo.pPoolSizes = sizes;
-  VkResult result = device_.api.vkCreateDescriptorPool(device_.host.device, &poolInfo, nullptr, &pool_);
+  VkResult result =
+      device_.api.vkCreateDescriptorPool(device_.host.device, &poolInfo, device_.host.allocationCallbacks, &pool_);
   if (result != VK_SUCCESS) return vulkanError("vkCreateDescriptorPool", result);
   const std::vector<VkDescriptorSetLayout> layouts(inFlight_, setLayout_);
   sets_.resize(inFlight_);
@@ -119,7 +125,7 @@ void Passes::bind(VkCommandBuffer commands, const ResidentFrame& frame, const gp
   next_ = (next_ + 1) % inFlight_;
   std::memcpy(params_.mapped().subspan(offset, sizeof(params)).data(), &params, sizeof(params));
   const VkDescriptorBufferInfo bufferInfo{params_.handle(), offset, sizeof(params)};
-  const VkImageView views[kBindings] = {VK_NULL_HANDLE, frame.atlas_.view(), color, depth};
+  const VkImageView views[kBindings] = {VK_NULL_HANDLE, frame.atlas_, color, depth};
   std::array<VkDescriptorImageInfo, kBindings> images{};
   std::array<VkWriteDescriptorSet, kBindings> writes{};
   std::uint32_t count = 0;

@@ -4,6 +4,7 @@
 
 #include "billow/runtime/runtime.h"
 #include "checks.h"
+#include "debug.h"
 #include "frame.h"
 #include "params.h"
 #include "passes.h"
@@ -29,12 +30,28 @@ Result<void> describeDevice(Device& device, BlockUse use) {
     return failure(ErrorCode::unsupported, std::string(properties.properties.deviceName) + " has no Vulkan 1.3");
   }
   device.maxImageExtent3D = properties.properties.limits.maxImageDimension3D;
+  device.imageGranularity = properties.properties.limits.bufferImageGranularity;
   device.api.vkGetPhysicalDeviceMemoryProperties(device.host.physicalDevice, &device.memory);
   device.bc7 = device.host.textureCompressionBc && sampled3D(device, VK_FORMAT_BC7_UNORM_BLOCK);
   // In software a block is decoded anew for each texel that is read, which takes several times as long.
   const bool software = properties.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
   if (use == BlockUse::decoded || (use == BlockUse::automatic && software)) device.bc7 = false;
   return {};
+}
+
+// Every feature that is not enabled, with what it is for; "" where none is missing.
+std::string missingFeatures(const EnabledFeatures& features) {
+  const std::pair<bool, const char*> needed[] = {
+      {features.bufferDeviceAddress, "bufferDeviceAddress (shaders find frames by address)"},
+      {features.timelineSemaphore, "timelineSemaphore (uploads are waited for by value)"},
+      {features.synchronization2, "synchronization2 (barriers and submissions)"}};
+  std::string missing;
+  for (const auto& [enabled, name] : needed) {
+    if (enabled) continue;
+    missing += missing.empty() ? "HostDevice: the device was created without " : ", ";
+    missing += name;
+  }
+  return missing;
 }
 
 const char* badField(const DrawInfo& draw) {
@@ -116,6 +133,7 @@ class RendererImpl final : public Renderer {
     const PassKey key = passKey(frame.indices(), marchOf(draw.colorFormat), draw.quality.filter, draw.quality.shadows);
     const auto pipeline = passes_.pipeline(key);
     if (!pipeline) return tl::unexpected(pipeline.error());
+    const DebugLabel label(device_.api, commands, "billow march");
     passes_.bind(commands, frame, marchParams(frame, draw), draw.color, draw.depth);
     device_.api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, *pipeline);
     device_.api.vkCmdDispatch(commands, (draw.width + 7) / 8, (draw.height + 7) / 8, 1);
@@ -155,6 +173,9 @@ class RendererImpl final : public Renderer {
 Result<std::unique_ptr<Renderer>> Renderer::create(const HostDevice& host, const Config& config) {
   if (host.getInstanceProcAddr == nullptr || host.device == VK_NULL_HANDLE || host.uploadQueue == VK_NULL_HANDLE) {
     return failure(ErrorCode::argument, "HostDevice: a handle is missing");
+  }
+  if (std::string missing = missingFeatures(host.features); !missing.empty()) {
+    return failure(ErrorCode::unsupported, std::move(missing));
   }
   if (config.recordsInFlight == 0) return failure(ErrorCode::argument, "Config: recordsInFlight is 0");
   return guarded<std::unique_ptr<Renderer>>([&]() -> Result<std::unique_ptr<Renderer>> {

@@ -6,7 +6,7 @@
 namespace billow::runtime {
 namespace {
 
-VkImageMemoryBarrier2 layoutBarrier(const Image& image, VkImageLayout from, VkImageLayout to) {
+VkImageMemoryBarrier2 layoutBarrier(VkImage image, VkImageLayout from, VkImageLayout to) {
   auto barrier = begin<VkImageMemoryBarrier2>(VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2);
   const bool first = from == VK_IMAGE_LAYOUT_UNDEFINED;
   barrier.srcStageMask = first ? VK_PIPELINE_STAGE_2_NONE : VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT;
@@ -18,31 +18,30 @@ VkImageMemoryBarrier2 layoutBarrier(const Image& image, VkImageLayout from, VkIm
   barrier.newLayout = to;
   barrier.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
   barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-  barrier.image = image.handle();
+  barrier.image = image;
   barrier.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
   return barrier;
 }
 
-void changeLayout(const Api& api, VkCommandBuffer commands, const ResidentFrame& frame, VkImageLayout from,
-                  VkImageLayout to) {
-  const VkImageMemoryBarrier2 barrier = layoutBarrier(frame.atlas_, from, to);
+void changeLayout(const Api& api, VkCommandBuffer commands, VkImage image, VkImageLayout from, VkImageLayout to) {
+  const VkImageMemoryBarrier2 barrier = layoutBarrier(image, from, to);
   auto info = begin<VkDependencyInfo>(VK_STRUCTURE_TYPE_DEPENDENCY_INFO);
   info.imageMemoryBarrierCount = 1;
   info.pImageMemoryBarriers = &barrier;
   api.vkCmdPipelineBarrier2(commands, &info);
 }
 
-void copyAll(const Api& api, VkCommandBuffer commands, const FrameObjects& objects, std::uint64_t bufferBytes) {
-  const ResidentFrame& frame = *objects.frame;
-  if (bufferBytes != 0) {
-    const VkBufferCopy whole{0, 0, bufferBytes};
-    api.vkCmdCopyBuffer(commands, objects.staging.handle(), frame.buffer_.handle(), 1, &whole);
+void copyAll(const Api& api, VkCommandBuffer commands, const FrameObjects& objects) {
+  const OwnMemory& memory = *objects.memory;
+  if (objects.bufferBytes != 0) {
+    const VkBufferCopy whole{0, 0, objects.bufferBytes};
+    api.vkCmdCopyBuffer(commands, objects.staging.handle(), memory.buffer.handle(), 1, &whole);
   }
   VkBufferImageCopy copy{};
   copy.bufferOffset = objects.atlasOffset;
   copy.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
-  copy.imageExtent = frame.atlas_.extent();
-  api.vkCmdCopyBufferToImage(commands, objects.staging.handle(), frame.atlas_.handle(),
+  copy.imageExtent = memory.atlas.extent();
+  api.vkCmdCopyBufferToImage(commands, objects.staging.handle(), memory.atlas.handle(),
                              VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &copy);
 }
 
@@ -50,21 +49,23 @@ void copyAll(const Api& api, VkCommandBuffer commands, const FrameObjects& objec
 
 Uploads::~Uploads() {
   const VkDevice device = device_.host.device;
-  if (pool_ != VK_NULL_HANDLE) device_.api.vkDestroyCommandPool(device, pool_, nullptr);
-  if (semaphore_ != VK_NULL_HANDLE) device_.api.vkDestroySemaphore(device, semaphore_, nullptr);
+  if (pool_ != VK_NULL_HANDLE) device_.api.vkDestroyCommandPool(device, pool_, device_.host.allocationCallbacks);
+  if (semaphore_ != VK_NULL_HANDLE)
+    device_.api.vkDestroySemaphore(device, semaphore_, device_.host.allocationCallbacks);
 }
 
 Result<void> Uploads::create() {
   auto poolInfo = begin<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
   poolInfo.flags = VK_COMMAND_POOL_CREATE_TRANSIENT_BIT;
   poolInfo.queueFamilyIndex = device_.host.uploadFamily;
-  VkResult result = device_.api.vkCreateCommandPool(device_.host.device, &poolInfo, nullptr, &pool_);
+  VkResult result =
+      device_.api.vkCreateCommandPool(device_.host.device, &poolInfo, device_.host.allocationCallbacks, &pool_);
   if (result != VK_SUCCESS) return vulkanError("vkCreateCommandPool", result);
   auto type = begin<VkSemaphoreTypeCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO);
   type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
   auto info = begin<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO);
   info.pNext = &type;
-  result = device_.api.vkCreateSemaphore(device_.host.device, &info, nullptr, &semaphore_);
+  result = device_.api.vkCreateSemaphore(device_.host.device, &info, device_.host.allocationCallbacks, &semaphore_);
   if (result != VK_SUCCESS) return vulkanError("vkCreateSemaphore", result);
   return {};
 }
@@ -84,10 +85,10 @@ Result<void> Uploads::record(VkCommandBuffer commands, const FrameObjects& objec
   beginInfo.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
   VkResult result = device_.api.vkBeginCommandBuffer(commands, &beginInfo);
   if (result != VK_SUCCESS) return vulkanError("vkBeginCommandBuffer", result);
-  const ResidentFrame& frame = *objects.frame;
-  changeLayout(device_.api, commands, frame, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
-  copyAll(device_.api, commands, objects, frame.bufferBytes_);
-  changeLayout(device_.api, commands, frame, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+  const VkImage atlas = objects.memory->atlas.handle();
+  changeLayout(device_.api, commands, atlas, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
+  copyAll(device_.api, commands, objects);
+  changeLayout(device_.api, commands, atlas, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
                VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
   result = device_.api.vkEndCommandBuffer(commands);
   if (result != VK_SUCCESS) return vulkanError("vkEndCommandBuffer", result);

@@ -10,7 +10,7 @@ namespace billow::runtime {
 std::uint32_t hashOf(const Space& space);
 
 // Of all that a volume's matter depends on, but not of the view. Low, high.
-std::array<std::uint32_t, 2> hashOf(const PlacedVolume& volume, std::uint64_t uploadValue);
+std::array<std::uint32_t, 2> hashOf(const PlacedVolume& volume, std::uint64_t frameNumber);
 
 }  // namespace billow::runtime
 

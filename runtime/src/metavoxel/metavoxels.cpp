@@ -186,7 +186,8 @@ class MetavoxelsImpl final : public Metavoxels {
     params.matter.z = hashOf(steps.space);
     for (std::size_t i = 0; i < steps.volumes.size(); ++i) {
       if (!steps.volumes[i].drawn()) continue;
-      const auto hash = hashOf(*steps.volumes[i].placed, draw.volumes[i].frame->uploadValue());
+      const auto& frame = static_cast<const ResidentFrame&>(*draw.volumes[i].frame);
+      const auto hash = hashOf(*steps.volumes[i].placed, frame.number_);
       gpu::uvec4& two = params.contents[i / 2];
       (i % 2 == 0 ? two.x : two.z) = hash[0];
       (i % 2 == 0 ? two.y : two.w) = hash[1];

@@ -72,11 +72,13 @@ VkDescriptorSetLayoutBinding computeBinding(std::uint32_t binding, VkDescriptorT
 
 MetavoxelPipelines::~MetavoxelPipelines() {
   const VkDevice device = device_.host.device;
-  for (const auto& [key, pipeline] : pipelines_) device_.api.vkDestroyPipeline(device, pipeline, nullptr);
-  if (pool_ != VK_NULL_HANDLE) device_.api.vkDestroyDescriptorPool(device, pool_, nullptr);
-  if (layout_ != VK_NULL_HANDLE) device_.api.vkDestroyPipelineLayout(device, layout_, nullptr);
+  for (const auto& [key, pipeline] : pipelines_)
+    device_.api.vkDestroyPipeline(device, pipeline, device_.host.allocationCallbacks);
+  if (pool_ != VK_NULL_HANDLE) device_.api.vkDestroyDescriptorPool(device, pool_, device_.host.allocationCallbacks);
+  if (layout_ != VK_NULL_HANDLE) device_.api.vkDestroyPipelineLayout(device, layout_, device_.host.allocationCallbacks);
   for (const VkDescriptorSetLayout layout : {matterLayout_, spaceLayout_}) {
-    if (layout != VK_NULL_HANDLE) device_.api.vkDestroyDescriptorSetLayout(device, layout, nullptr);
+    if (layout != VK_NULL_HANDLE)
+      device_.api.vkDestroyDescriptorSetLayout(device, layout, device_.host.allocationCallbacks);
   }
 }
 
@@ -103,11 +105,13 @@ Result<void> MetavoxelPipelines::createLayouts() {
   auto setInfo = begin<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
   setInfo.bindingCount = 2;
   setInfo.pBindings = matter;
-  VkResult result = device_.api.vkCreateDescriptorSetLayout(device_.host.device, &setInfo, nullptr, &matterLayout_);
+  VkResult result = device_.api.vkCreateDescriptorSetLayout(device_.host.device, &setInfo,
+                                                            device_.host.allocationCallbacks, &matterLayout_);
   if (result != VK_SUCCESS) return vulkanError("vkCreateDescriptorSetLayout", result);
   setInfo.bindingCount = kCount;
   setInfo.pBindings = space;
-  result = device_.api.vkCreateDescriptorSetLayout(device_.host.device, &setInfo, nullptr, &spaceLayout_);
+  result = device_.api.vkCreateDescriptorSetLayout(device_.host.device, &setInfo, device_.host.allocationCallbacks,
+                                                   &spaceLayout_);
   if (result != VK_SUCCESS) return vulkanError("vkCreateDescriptorSetLayout", result);
   const VkDescriptorSetLayout layouts[] = {matterLayout_, spaceLayout_};
   const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(PassPush)};
@@ -116,7 +120,7 @@ Result<void> MetavoxelPipelines::createLayouts() {
   info.pSetLayouts = layouts;
   info.pushConstantRangeCount = 1;
   info.pPushConstantRanges = &range;
-  result = device_.api.vkCreatePipelineLayout(device_.host.device, &info, nullptr, &layout_);
+  result = device_.api.vkCreatePipelineLayout(device_.host.device, &info, device_.host.allocationCallbacks, &layout_);
   if (result != VK_SUCCESS) return vulkanError("vkCreatePipelineLayout", result);
   return {};
 }
@@ -131,7 +135,8 @@ Result<void> MetavoxelPipelines::createSets() {
   poolInfo.maxSets = matters + inFlight_;
   poolInfo.poolSizeCount = 4;
   poolInfo.pPoolSizes = sizes;
-  VkResult result = device_.api.vkCreateDescriptorPool(device_.host.device, &poolInfo, nullptr, &pool_);
+  VkResult result =
+      device_.api.vkCreateDescriptorPool(device_.host.device, &poolInfo, device_.host.allocationCallbacks, &pool_);
   if (result != VK_SUCCESS) return vulkanError("vkCreateDescriptorPool", result);
   const auto allocate = [&](VkDescriptorSetLayout layout, std::uint32_t count, std::vector<VkDescriptorSet>& sets) {
     const std::vector<VkDescriptorSetLayout> layouts(count, layout);
@@ -210,7 +215,7 @@ void MetavoxelPipelines::write(const MetavoxelResources& resources, std::uint32_
     // The view has no atlas; the pool is an image of its kind.
     VkDescriptorImageInfo atlas{VK_NULL_HANDLE, resources.pool.view(), VK_IMAGE_LAYOUT_GENERAL};
     if (i > 0) {
-      atlas.imageView = static_cast<const ResidentFrame&>(*draw.volumes[i - 1].frame).atlas_.view();
+      atlas.imageView = static_cast<const ResidentFrame&>(*draw.volumes[i - 1].frame).atlas_;
       atlas.imageLayout = VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL;
     }
     const VkDescriptorSet set = matter(inFlight, i);

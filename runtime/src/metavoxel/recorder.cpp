@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "debug.h"
+
 namespace billow::runtime {
 
 std::uint64_t spawnJobsAt(const MetavoxelUpload& upload, const MetavoxelDraw& draw) {
@@ -11,6 +13,7 @@ std::uint64_t spawnJobsAt(const MetavoxelUpload& upload, const MetavoxelDraw& dr
 }
 
 void DrawRecorder::record(const MetavoxelDraw& draw, const DrawSteps& steps, bool first, bool keepFilled) {
+  const DebugLabel label(device_.api, commands_, "billow metavoxels");
   stamp(draw, 0);
   begin(draw, steps, first);
   bin(steps, keepFilled);
@@ -27,6 +30,7 @@ void DrawRecorder::record(const MetavoxelDraw& draw, const DrawSteps& steps, boo
 }
 
 void DrawRecorder::begin(const MetavoxelDraw& draw, const DrawSteps& steps, bool first) {
+  const DebugLabel label(device_.api, commands_, "billow begin, spawn");
   const MetavoxelRegions& regions = resources_.sizes().regions;
   const VkBuffer arrays = resources_.arrays.handle();
   barrier();  // after the draw before
@@ -56,6 +60,7 @@ void DrawRecorder::begin(const MetavoxelDraw& draw, const DrawSteps& steps, bool
 }
 
 void DrawRecorder::bin(const DrawSteps& steps, bool keepFilled) {
+  const DebugLabel label(device_.api, commands_, "billow bin");
   const std::uint32_t particles = steps.particles;
   const std::array<std::uint32_t, 3> groups{std::min(particles, gpu::kBinRow),
                                             (particles + gpu::kBinRow - 1) / gpu::kBinRow, 1};
@@ -119,6 +124,7 @@ std::uint64_t DrawRecorder::roundAt(std::uint32_t round) const {
 
 // Fills a round's metavoxels and sums their columns.
 void DrawRecorder::fill(const MetavoxelDraw& draw, const DrawSteps& steps, std::uint32_t round, bool first) {
+  const DebugLabel label(device_.api, commands_, "billow fill");
   const std::uint64_t at = roundAt(round);
   PassPush push{.round = round};
   indirect(steps.blocks, push, at + offsetof(gpu::MetavoxelRound, blocks));
@@ -140,6 +146,7 @@ void DrawRecorder::fill(const MetavoxelDraw& draw, const DrawSteps& steps, std::
 
 // Once all rounds are injected: what shines, level by level, then who gets how much of it; once a bounce.
 void DrawRecorder::field(const MetavoxelDraw& draw, const DrawSteps& steps) {
+  const DebugLabel label(device_.api, commands_, "billow light field");
   const FieldSizes& sizes = resources_.sizes().field;
   const auto over = [&](VkPipeline pipeline, const PassPush& push, std::uint32_t edge) {
     const std::uint32_t groups = (edge + 3) / 4;
@@ -155,6 +162,7 @@ void DrawRecorder::field(const MetavoxelDraw& draw, const DrawSteps& steps) {
 }
 
 void DrawRecorder::light(const MetavoxelDraw& draw, const DrawSteps& steps, const PassPush& push) {
+  const DebugLabel label(device_.api, commands_, "billow light, march");
   const std::uint64_t columns = roundAt(push.round) + offsetof(gpu::MetavoxelRound, columns);
   indirect(steps.light, push, columns);
   barrier();

@@ -80,7 +80,8 @@ void imageBarrier(const Device& device, VkCommandBuffer commands, const Image& i
 }  // namespace
 
 MetavoxelResources::~MetavoxelResources() {
-  if (sampler != VK_NULL_HANDLE) device_.api.vkDestroySampler(device_.host.device, sampler, nullptr);
+  if (sampler != VK_NULL_HANDLE)
+    device_.api.vkDestroySampler(device_.host.device, sampler, device_.host.allocationCallbacks);
 }
 
 std::uint64_t MetavoxelResources::bytes() const {
@@ -244,7 +245,8 @@ Result<void> MetavoxelResources::createSampler() {
   auto info = begin<VkSamplerCreateInfo>(VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO);
   info.magFilter = info.minFilter = VK_FILTER_LINEAR;
   info.addressModeU = info.addressModeV = info.addressModeW = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE;
-  const VkResult result = device_.api.vkCreateSampler(device_.host.device, &info, nullptr, &sampler);
+  const VkResult result =
+      device_.api.vkCreateSampler(device_.host.device, &info, device_.host.allocationCallbacks, &sampler);
   if (result != VK_SUCCESS) return vulkanError("vkCreateSampler", result);
   return {};
 }

@@ -45,8 +45,15 @@ struct Error {
 template <class T>
 using Result = tl::expected<T, Error>;
 
-// What the host lends. It must outlive the Renderer. The device needs Vulkan 1.3 with the features
-// bufferDeviceAddress, timelineSemaphore and synchronization2 enabled.
+// Features that the host enabled when it created the device. billow cannot ask for what is enabled, and needs all.
+struct EnabledFeatures {
+  bool bufferDeviceAddress = true;
+  bool timelineSemaphore = true;
+  bool synchronization2 = true;
+};
+
+// What the host lends. It must outlive the Renderer. The device needs Vulkan 1.3. Where the instance has
+// VK_EXT_debug_utils enabled, objects get names and passes labels that begin with "billow".
 struct HostDevice {
   VkInstance instance = VK_NULL_HANDLE;
   VkPhysicalDevice physicalDevice = VK_NULL_HANDLE;
@@ -57,6 +64,10 @@ struct HostDevice {
   std::uint32_t drawFamily = 0;                    // of the queues that run recorded commands
   bool textureCompressionBc = false;               // you checked and enabled it
   VkPipelineCache pipelineCache = VK_NULL_HANDLE;  // optional: pipelines are looked up in it and added to it
+  EnabledFeatures features = {};
+  // Optional: passed with every object that billow makes and destroys; called from billow's threads too, so they must
+  // be thread-safe.
+  const VkAllocationCallbacks* allocationCallbacks = nullptr;
 };
 
 // What becomes of BC7 bricks. Automatic: they stay blocks where the device samples such 3D images fast, else they are
@@ -105,7 +116,8 @@ class Frame {
  public:
   virtual ~Frame() = default;
   virtual const FrameStats& stats() const = 0;
-  // uploadSemaphore() reaches this value when the upload is complete.
+  // uploadSemaphore() reaches this value when the upload is complete. 0 of a Streamer's frames, which are complete:
+  // wait for what Streamer::wait() says.
   virtual std::uint64_t uploadValue() const = 0;
   // Whether any grid has an active voxel.
   virtual bool empty() const = 0;
