@@ -1,14 +1,10 @@
 #include <fmt/format.h>
-#include <zstd.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <memory>
 
 #include "billow/format/brick.h"
-#include "billow/format/page_codec.h"
-#include "hash.h"
+#include "billow/format/page_unpacker.h"
 #include "rules.h"
 
 namespace billow::format {
@@ -18,48 +14,10 @@ bool finite(float value) {
   return std::isfinite(value);
 }
 
-Place pagePlace(const Pack& pack, std::uint32_t number) {
-  Place place = PackReader::view(pack).place(kSectionPages, pack.pages()[number].offset);
-  place.page = number;
-  return place;
-}
-
-bool readStored(const Pack& pack, std::uint32_t number, std::vector<std::byte>& stored, IssueSink& sink) {
-  const PageRecord& record = pack.pages()[number];
-  const Place place = pagePlace(pack, number);
-  stored.resize(record.storedSize);
-  if (!place.offset || !pack.source().read(*place.offset, stored)) {
-    sink.report(Rule::cannotRead, place, fmt::format("{} bytes cannot be read.", stored.size()));
-    return false;
-  }
-  if (hashBytes(stored) != record.checksum) {
-    sink.report(Rule::pageChecksum, place, fmt::format("Its {} stored bytes were altered.", stored.size()));
-    return false;
-  }
-  return true;
-}
-
-// One frame of RFC 8878 is what a page holds: the library would also take several, and frames of its first versions.
-bool isOneFrame(std::span<const std::byte> stored) {
-  constexpr std::array<std::byte, 4> kFrameMagic = {std::byte{0x28}, std::byte{0xb5}, std::byte{0x2f}, std::byte{0xfd}};
-  return stored.size() >= kFrameMagic.size() && std::equal(kFrameMagic.begin(), kFrameMagic.end(), stored.begin()) &&
-         ZSTD_findFrameCompressedSize(stored.data(), stored.size()) == stored.size();
-}
-
-bool decompressZstd(std::span<const std::byte> stored, std::vector<std::byte>& raw) {
-  if (!isOneFrame(stored)) return false;
-  // A context is 150 KB: one a thread, not one a page.
-  thread_local const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
-  if (!context) return false;
-  const std::size_t size = ZSTD_decompressDCtx(context.get(), raw.data(), raw.size(), stored.data(), stored.size());
-  return !ZSTD_isError(size) && size == raw.size();
-}
-
-bool decompress(const PageRecord& record, std::span<const std::byte> stored, std::vector<std::byte>& raw) {
-  raw.resize(record.rawSize);
-  const bool done = record.codec == static_cast<std::uint32_t>(Codec::model) ? decodePage(record.streams, stored, raw)
-                                                                             : decompressZstd(stored, raw);
-  return done && lowHash(raw) == record.rawChecksum;
+// Where pages are read one by one, and memory is the heap's.
+PageUnpacker& unpacker() {
+  thread_local PageUnpacker keptByThread(std::pmr::new_delete_resource());
+  return keptByThread;
 }
 
 // Checks the items of one page, each by itself.
@@ -70,7 +28,7 @@ class ItemRules {
         totals_(totals),
         page_(page),
         record_(pages_[page.number]),
-        place_(pagePlace(pack, page.number)),
+        place_(placeOfPage(pack, page.number)),
         sink_(sink) {}
 
   void checkAll() {
@@ -191,14 +149,21 @@ bool loadPage(const Pack& pack, std::uint32_t number, Page& page, IssueSink& sin
     return false;
   }
   const PageRecord& record = pack.pages()[number];
+  const Place place = placeOfPage(pack, number);
   page.number = number;
+  thread_local std::vector<std::byte> storedByThread;
   const bool isRaw = record.codec == static_cast<std::uint32_t>(Codec::raw);
-  thread_local std::vector<std::byte> stored;
-  if (!readStored(pack, number, isRaw ? page.raw : stored, sink)) return false;
-  if (isRaw ? lowHash(page.raw) == record.rawChecksum : decompress(record, stored, page.raw)) return true;
-  sink.report(Rule::pageDecompress, pagePlace(pack, number),
-              fmt::format("It does not give the {} bytes that were written.", record.rawSize));
-  return false;
+  std::vector<std::byte>& stored = isRaw ? page.raw : storedByThread;
+  stored.resize(record.storedSize);
+  if (!place.offset || !pack.source().read(*place.offset, stored)) {
+    sink.report(Rule::cannotRead, place, fmt::format("{} bytes cannot be read.", stored.size()));
+    return false;
+  }
+  page.raw.resize(record.rawSize);
+  const auto done =
+      isRaw ? unpacker().checkRaw(pack, number, stored, true) : unpacker().unpack(pack, number, stored, true, page.raw);
+  if (!done) sink.report(static_cast<Rule>(done.error().kind->id), place, done.error().detail);
+  return done.has_value();
 }
 
 bool checkPageItems(const Pack& pack, const StreamTotals& totals, const Page& page, IssueSink& sink) {
