@@ -106,6 +106,7 @@ struct Device {
   std::atomic<std::uint64_t> used = 0;
   std::atomic<std::uint64_t> frames = 0;  // that were made: each has a number of its own
   bool bc7 = false;  // BC7 bricks stay BC7, in a sampled 3D image; else they are decoded to uniform bricks of 8 bits
+  std::uint32_t leastAtlasBricks = 0;  // as LoadRequest has it
 };
 
 // Counts bytes as used, or returns false where they would exceed the budget.

@@ -8,7 +8,6 @@ namespace billow::runtime {
 namespace {
 
 constexpr std::uint32_t kSlotDepth = 2;  // texels along z
-constexpr std::uint32_t kSlotBytes = 128;
 constexpr std::uint32_t kBlockRows = 2;  // of a slot, in each slice
 constexpr std::uint32_t kRowBytes = 32;  // two blocks
 
@@ -24,7 +23,7 @@ VkExtent3D AtlasShape::extent() const {
 }
 
 std::uint64_t AtlasShape::bytes() const {
-  return layers != 0 ? (std::uint64_t{layers} << (xBits + yBits)) * kSlotBytes : 1;
+  return layers != 0 ? slots() * kAtlasSlotBytes : 1;
 }
 
 std::optional<AtlasShape> atlasShape(std::uint32_t slots, std::uint32_t maxExtent) {
@@ -40,13 +39,14 @@ std::optional<AtlasShape> atlasShape(std::uint32_t slots, std::uint32_t maxExten
   return std::nullopt;
 }
 
-void writeSlot(const AtlasShape& shape, const StoredBrick& brick, std::span<std::byte> image) {
-  const std::size_t x = brick.slot & ((1u << shape.xBits) - 1);
-  const std::size_t y = brick.slot >> shape.xBits & ((1u << shape.yBits) - 1);
-  const std::size_t z = brick.slot >> (shape.xBits + shape.yBits);
+void writeSlot(const AtlasShape& shape, std::uint32_t slot, std::span<const std::byte, kAtlasSlotBytes> brick,
+               std::span<std::byte> image) {
+  const std::size_t x = slot & ((1u << shape.xBits) - 1);
+  const std::size_t y = slot >> shape.xBits & ((1u << shape.yBits) - 1);
+  const std::size_t z = slot >> (shape.xBits + shape.yBits);
   const std::size_t imageRow = std::size_t{kRowBytes} << shape.xBits;
   const std::size_t imageRows = std::size_t{kBlockRows} << shape.yBits;
-  const std::byte* source = brick.bytes.data();
+  const std::byte* source = brick.data();
   for (std::size_t slice = 0; slice < kSlotDepth; ++slice) {
     for (std::size_t row = 0; row < kBlockRows; ++row) {
       const std::size_t to = ((z * kSlotDepth + slice) * imageRows + y * kBlockRows + row) * imageRow + x * kRowBytes;

@@ -7,9 +7,11 @@
 #include <optional>
 #include <span>
 
-#include "gpu_grid.h"
+#include <vulkan/vulkan_core.h>
 
 namespace billow::runtime {
+
+inline constexpr std::uint32_t kAtlasSlotBytes = 128;
 
 // Slots along x and y are powers of two, so that a shader finds a slot by shifts. Without slots the image is one texel
 // of R8, for a descriptor must be valid though nothing is read through it.
@@ -20,6 +22,7 @@ struct AtlasShape {
 
   VkFormat format() const;
   VkExtent3D extent() const;  // texels
+  std::uint64_t slots() const { return std::uint64_t{layers} << (xBits + yBits); }
   std::uint64_t bytes() const;
 };
 
@@ -27,7 +30,8 @@ struct AtlasShape {
 std::optional<AtlasShape> atlasShape(std::uint32_t slots, std::uint32_t maxExtent);
 
 // Copies a BC7 brick into its slot of the image's bytes (tightly packed, as a buffer-to-image copy reads them).
-void writeSlot(const AtlasShape& shape, const StoredBrick& brick, std::span<std::byte> image);
+void writeSlot(const AtlasShape& shape, std::uint32_t slot, std::span<const std::byte, kAtlasSlotBytes> brick,
+               std::span<std::byte> image);
 
 }  // namespace billow::runtime
 

@@ -5,12 +5,11 @@
 #include <array>
 #include <memory>
 #include <optional>
-#include <vector>
 
 #include "atlas.h"
-#include "gpu_grid.h"
 #include "interface.h"
 #include "memory.h"
+#include "stream/load_frame.h"
 
 namespace billow::runtime {
 
@@ -46,9 +45,7 @@ class ResidentFrame final : public Frame {
   std::uint64_t uploadValue_ = 0;
   std::uint64_t number_ = 0;  // no other frame's of this device: memory is given to one frame after another
   std::array<ResidentGrid, gpu::kGridSlots> grids_;
-  // Where its bytes begin: bricks that are not BC7, then tables, records and masks of all grids. So a shader that reads
-  // a word past the last brick stays inside.
-  VkDeviceAddress bricks_ = 0;
+  VkDeviceAddress bricks_ = 0;  // where LoadedFrame::buffer begins
   VkImageView atlas_ = VK_NULL_HANDLE;
   AtlasShape shape_;
   std::unique_ptr<FrameMemory> memory_;
@@ -61,22 +58,16 @@ class OwnMemory final : public FrameMemory {
   Image atlas;
 };
 
-// A frame on the CPU: what will be copied, with the views that its bricks point into.
-struct StagedFrame {
-  std::vector<format::GridView> views;
-  std::array<std::optional<GpuGrid>, gpu::kGridSlots> grids;
-  AtlasShape shape;
-  BrickSlots slots;
-  std::uint64_t bufferBytes = 0;
-};
-
 // What indices() will be of the frame once it is resident. Reads no page.
 Result<FrameIndices> frameIndices(const format::Pack& pack, const format::VolumeRecord& volume, std::uint32_t frame,
                                   const UploadOptions& options);
 
-// Loads and checks the grids, builds indices and gives out slots. Allocates nothing on the device.
-Result<StagedFrame> stageFrame(const Device& device, const format::Pack& pack, std::uint32_t volume,
-                               std::uint32_t frame, const UploadOptions& options);
+// Reads the pages and loads them, by the device's limits. Allocates nothing on it.
+Result<LoadedFrame> readFrame(const Device& device, const format::Pack& pack, std::uint32_t volume, std::uint32_t frame,
+                              const UploadOptions& options, FrameLoader& loader);
+
+// A loaded grid of a frame whose buffer begins at `buffer`.
+ResidentGrid residentGrid(const LoadedGrid& grid, VkDeviceAddress buffer);
 
 // Creates the frame's objects and its staging buffer, checks them against the budget, then allocates and fills the
 // staging memory: the buffer's bytes, and from `atlasOffset` on the atlas's.
@@ -87,7 +78,7 @@ struct FrameObjects {
   Buffer staging;
   std::uint64_t atlasOffset = 0;
 };
-Result<FrameObjects> makeFrameObjects(Device& device, const StagedFrame& staged);
+Result<FrameObjects> makeFrameObjects(Device& device, const LoadedFrame& loaded);
 
 }  // namespace billow::runtime
 

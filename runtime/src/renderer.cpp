@@ -36,6 +36,7 @@ Result<void> describeDevice(Device& device, BlockUse use) {
   // In software a block is decoded anew for each texel that is read, which takes several times as long.
   const bool software = properties.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
   if (use == BlockUse::decoded || (use == BlockUse::automatic && software)) device.bc7 = false;
+  device.leastAtlasBricks = use == BlockUse::native ? 1 : kLeastAtlasBricks;
   return {};
 }
 
@@ -82,9 +83,10 @@ class RendererImpl final : public Renderer {
                                         const UploadOptions& options) override {
     return guarded<std::unique_ptr<Frame>>([&]() -> Result<std::unique_ptr<Frame>> {
       uploads_.collect();
-      const auto staged = stageFrame(device_, pack, volume, frame, options);
-      if (!staged) return tl::unexpected(staged.error());
-      auto objects = makeFrameObjects(device_, *staged);
+      FrameLoader loader(std::pmr::new_delete_resource());
+      const auto loaded = readFrame(device_, pack, volume, frame, options, loader);
+      if (!loaded) return tl::unexpected(loaded.error());
+      auto objects = makeFrameObjects(device_, *loaded);
       if (!objects) return tl::unexpected(objects.error());
       if (auto done = uploads_.submit(*objects); !done) return tl::unexpected(done.error());
       return std::unique_ptr<Frame>(std::move(objects->frame));

@@ -70,8 +70,9 @@ struct HostDevice {
   const VkAllocationCallbacks* allocationCallbacks = nullptr;
 };
 
-// What becomes of BC7 bricks. Automatic: they stay blocks where the device samples such 3D images fast, else they are
-// decoded to uniform bricks of 8 bits, as on software devices. native: blocks wherever the device samples them.
+// What becomes of BC7 bricks. Automatic: they stay blocks where the device samples such 3D images fast and the frame has
+// enough of them to fill one, else they are decoded to uniform bricks of 8 bits, as on software devices. native: blocks
+// wherever the device samples them.
 enum class BlockUse { automatic, native, decoded };
 
 struct Config {
