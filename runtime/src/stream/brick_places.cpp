@@ -24,7 +24,7 @@ std::optional<std::uint32_t> BrickPlaces::place(std::uint32_t encoding, const st
   }
   std::uint32_t& word = words_[unit];
   if (word != 0) return word >> format::kEncodingShift == encoding ? std::optional(word) : std::nullopt;
-  std::byte* const to = takeUnits(encoding, word);
+  std::byte* const to = take(encoding, word);
   if (to == nullptr) return std::nullopt;
   copy(to, bytes, std::size_t{format::brickUnits(encoding)} * format::kBrickUnitBytes);
   return word;
@@ -36,7 +36,7 @@ std::optional<std::uint32_t> BrickPlaces::placeBlocks(std::uint32_t encoding, co
   if (word != 0 && word >> format::kEncodingShift != stored) return std::nullopt;
   if (!plan_.inAtlas) {
     if (word != 0) return word;
-    std::byte* const to = takeUnits(stored, word);
+    std::byte* const to = take(stored, word);
     if (to == nullptr) return std::nullopt;
     format::Texels texels;
     format::decodeTexels(encoding, {bytes, kAtlasSlotBytes}, texels);
@@ -51,7 +51,7 @@ std::optional<std::uint32_t> BrickPlaces::placeBlocks(std::uint32_t encoding, co
   return encoding << format::kEncodingShift | (word & format::kBrickUnitMask);
 }
 
-std::byte* BrickPlaces::takeUnits(std::uint32_t encoding, std::uint32_t& word) {
+std::byte* BrickPlaces::take(std::uint32_t encoding, std::uint32_t& word) {
   const std::uint32_t units = format::brickUnits(encoding);
   if (units > plan_.bricks.count - units_) return nullptr;
   const std::uint64_t slot = plan_.bricks.at / format::kBrickUnitBytes + units_;

@@ -21,10 +21,13 @@ class BrickPlaces {
   BrickPlaces(const LoadPlan& plan, std::span<std::uint32_t> words, std::span<std::byte> buffer,
               std::span<std::byte> atlas);
 
-  // The record's brick word, encoding on the GPU << kEncodingShift | slot, of a brick that is not constant: its bytes
-  // and the number of its first unit. nullopt where there are more than the plan has room for, or where its units are
-  // in part those of another brick.
+  // The record's brick word, encoding on the GPU << kEncodingShift | slot, of a brick that is not constant, by its
+  // bytes and the number of its first unit. nullopt where there are more than the plan has room for, or where its units
+  // are in part those of another brick.
   std::optional<std::uint32_t> place(std::uint32_t encoding, const std::byte* bytes, std::uint32_t unit);
+
+  // Room in the buffer for a brick that the caller writes, and its brick word; null where there is none.
+  std::byte* take(std::uint32_t encoding, std::uint32_t& word);
 
   // Copies what is still due, and clears the slots of the atlas that nothing is in.
   void finish();
@@ -35,7 +38,6 @@ class BrickPlaces {
 
  private:
   std::optional<std::uint32_t> placeBlocks(std::uint32_t encoding, const std::byte* bytes, std::uint32_t& word);
-  std::byte* takeUnits(std::uint32_t encoding, std::uint32_t& word);  // null where there is no room
   void copy(std::byte* to, const std::byte* from, std::size_t bytes);
   void flush();
 

@@ -5,8 +5,8 @@
 
 #include "checks.h"
 #include "stream/brick_places.h"
-#include "stream/grid_builder.h"
 #include "stream/load_plan.h"
+#include "stream/means_builder.h"
 #include "stream/page_items.h"
 
 namespace billow::runtime {
@@ -69,15 +69,24 @@ class Load {
     const GridScratch scratch{.records = numbersOf(Stream::node3),
                               .lists = numbersOf(Stream::node4),
                               .tiles = scratch_.take<std::uint32_t>(plan_.tileSlots),
-                              .distances = scratch_.take<std::uint8_t>(plan_.distanceBytes)};
+                              .distances = scratch_.take<std::uint8_t>(plan_.distanceBytes),
+                              .means = scratch_.take<float>(plan_.means)};
     for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
       const GridPlan& grid = plan_.grids[slot];
       if (grid.frame == nullptr) continue;
       describe(grid, frame_.grids[slot]);
+      if (request_.means) frame_.grids[slot].frame = frameOfMeans(*grid.frame);
       if (grid.cells.count() == 0) continue;
-      GridBuilder builder(request_, grid, items_, bricks, masks, scratch, buffer_);
-      if (!builder.build()) return packError(builder.issue());
-      frame_.grids[slot].absent5 = builder.absent5();
+      TreeWalk walk(request_, grid, items_);
+      if (request_.means) {
+        MeansBuilder builder(walk, grid, bricks, masks, scratch, buffer_);
+        if (!builder.build()) return packError(walk.issue());
+        frame_.grids[slot].frame.activeVoxels = builder.activeVoxels();
+      } else {
+        GridBuilder builder(walk, grid, bricks, masks, scratch, buffer_);
+        if (!builder.build()) return packError(walk.issue());
+        frame_.grids[slot].absent5 = builder.absent5();
+      }
     }
     bricks.finish();
     finish(bricks, masks);

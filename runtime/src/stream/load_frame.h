@@ -33,6 +33,9 @@ struct LoadRequest {
   std::uint32_t volume = 0, frame = 0;  // in range
   GridChoice grids = {};                // numbers of the volume, or kNone
   Index index = Index::automatic;
+  // In place of the grids their means of 8^3 voxels each, with a flat index: little memory, and pages are read all the
+  // same. Optical depth is that of the grids.
+  bool means = false;
   bool bc7 = false;                                    // BC7 bricks stay blocks, in an image
   std::uint32_t leastAtlasBricks = kLeastAtlasBricks;  // where there are fewer, they are decoded all the same
   std::uint32_t maxImageExtent3D = 0;                  // of the device; read with bc7

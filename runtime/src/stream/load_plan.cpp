@@ -5,10 +5,11 @@
 #include <string>
 
 #include "api.h"
+#include "billow/format/affine.h"
 #include "billow/format/brick.h"
 #include "billow/format/rule.h"
 #include "stream/distance_field.h"
-#include "stream/grid_builder.h"
+#include "stream/means_builder.h"
 #include "stream/page_items.h"
 
 namespace billow::runtime {
@@ -64,11 +65,19 @@ const char* impossibleCount(const format::GridFrame& frame, const Items& items) 
   return others > of(items, Stream::unit) ? "units" : nullptr;
 }
 
-void sizeIndex(GridPlan& grid) {
+// Node4s stand in as many places as the root has children: all child list entries but those of Node3s, of which each
+// has one at least.
+std::uint64_t mostPlaces(const format::GridFrame& frame) {
+  return std::min<std::uint64_t>(frame.childCount - frame.node3Count, 32768);
+}
+
+void sizeGrid(GridPlan& grid) {
   const format::GridFrame& frame = *grid.frame;
-  // Node4s stand in as many places as the root has children: all child list entries but those of Node3s, of which each
-  // has one at least.
-  const std::uint64_t places = std::min<std::uint64_t>(frame.childCount - frame.node3Count, 32768);
+  const std::uint64_t places = mostPlaces(frame);
+  grid.records.count = std::uint64_t{frame.node3Count} + frame.tileCount;
+  grid.masks = frame.maskCount;
+  grid.blocks = frame.brickCount[static_cast<std::uint32_t>(format::BrickClass::bc7)];
+  for (std::uint32_t c = 1; c < format::kBrickClassCount; ++c) grid.units += frame.brickUnits[c];
   switch (grid.index) {
     case Index::flat:
       grid.table.count = grid.cells.count();
@@ -84,6 +93,14 @@ void sizeIndex(GridPlan& grid) {
   }
 }
 
+void sizeMeans(GridPlan& grid) {
+  const std::uint64_t bricks = std::min(grid.cells.count(), 8 * mostPlaces(*grid.frame));
+  grid.table.count = grid.cells.count();
+  grid.records.count = bricks + grid.frame->tileCount;
+  grid.masks = bricks;
+  grid.units = bricks * format::brickUnits(encodingOfMeans(*grid.frame));
+}
+
 Result<void> planGrid(GridPlan& grid, const LoadRequest& request, std::span<const StoredPage> pages) {
   const format::Pack& pack = *request.pack;
   const format::GridFrame& frame = *grid.frame;
@@ -95,12 +112,15 @@ Result<void> planGrid(GridPlan& grid, const LoadRequest& request, std::span<cons
     return packError(format::makeIssue(format::Rule::counts, gridPlace(request, grid.number),
                                        std::string("Its pages cannot have so many ") + what + "."));
   }
-  grid.cells = format::cellBox(frame);
-  grid.index = chooseIndex(frame, request.index);
+  const format::GridFrame means = frameOfMeans(frame);
+  if (request.means && !format::invertible(means.indexToWorld)) {
+    return failure(ErrorCode::unsupported, "the frame's voxels are too large for coarser ones");
+  }
+  grid.cells = format::cellBox(request.means ? means : frame);
+  grid.index = request.means ? Index::flat : chooseIndex(frame, request.index);
   if (grid.cells.count() == 0) return {};
-  grid.records.count = std::uint64_t{frame.node3Count} + frame.tileCount;
   grid.tileSlots = std::bit_ceil(std::uint64_t{frame.tileCount} * 2 + 1);
-  sizeIndex(grid);
+  request.means ? sizeMeans(grid) : sizeGrid(grid);
   return {};
 }
 
@@ -117,9 +137,9 @@ Result<void> placeSections(LoadPlan& plan, const LoadRequest& request) {
     place(grid.records, sizeof(GpuRecord), at);
     place(grid.node4, 4, at);
     place(grid.children, 4, at);
-    plan.masks.count += grid.frame->maskCount;
-    blocks += grid.frame->brickCount[static_cast<std::uint32_t>(format::BrickClass::bc7)];
-    for (std::uint32_t c = 1; c < format::kBrickClassCount; ++c) plan.bricks.count += grid.frame->brickUnits[c];
+    plan.masks.count += grid.masks;
+    plan.bricks.count += grid.units;
+    blocks += grid.blocks;
   }
   plan.inAtlas = request.bc7 && blocks >= std::max(request.leastAtlasBricks, 1u);
   if (!plan.inAtlas) plan.bricks.count += blocks * kDecodedUnits;
@@ -151,7 +171,8 @@ void sumScratch(LoadPlan& plan, std::size_t pageCount) {
   for (const Stream stream : {Stream::unit, Stream::mask, Stream::node3, Stream::node4}) {
     plan.scratch += scratchBytes(of(plan.items, stream) * 4);
   }
-  plan.scratch += scratchBytes(plan.tileSlots * 4) + scratchBytes(plan.distanceBytes) + scratchBytes(plan.bufferBytes);
+  plan.scratch += scratchBytes(plan.tileSlots * 4) + scratchBytes(plan.distanceBytes) + scratchBytes(plan.bufferBytes) +
+                  scratchBytes(plan.means * sizeof(float));
   if (plan.inAtlas) plan.scratch += scratchBytes(plan.shape.bytes());
 }
 
@@ -193,6 +214,7 @@ Result<LoadPlan> planLoad(const LoadRequest& request, std::span<const StoredPage
   const format::VolumeRecord& volume = pack.volumes()[request.volume];
   if (request.frame >= volume.frameCount) return failure(ErrorCode::argument, "the volume has no such frame");
   LoadPlan plan;
+  plan.means = request.means ? kNode4Cells : 0;
   std::uint64_t content = 0;
   for (std::size_t i = 0; i < pages.size(); ++i) {
     const std::uint32_t number = pages[i].number;

@@ -20,8 +20,9 @@ struct GridPlan {
   std::uint32_t number = format::kNone;      // within the volume
   format::CellBox cells{};
   Index index = Index::flat;
-  Section table, records, node4, children;  // without items where nothing is active
-  std::uint64_t tileSlots = 0;              // of the hash table that finds tiles' records, a power of two
+  Section table, records, node4, children;         // without items where nothing is active
+  std::uint64_t tileSlots = 0;                     // of a RecordTable
+  std::uint64_t masks = 0, blocks = 0, units = 0;  // at most: masks, BC7 bricks, units of others
 };
 
 struct LoadPlan {
@@ -29,9 +30,10 @@ struct LoadPlan {
   std::array<std::uint64_t, format::kStreamCount> items{};  // of all pages
   std::uint64_t contentBytes = 0;                           // of all pages, each rounded up by scratchBytes()
   std::uint64_t distanceBytes = 0;                          // scratch of the largest DistanceField
-  std::uint64_t tileSlots = 0;
-  Section bricks;  // units; in the buffer, behind what grids have of their own
-  Section masks;   // last in the buffer, so that a shader that reads a word past the last brick stays inside
+  std::uint64_t tileSlots = 0;                              // the most of a grid
+  std::uint64_t means = 0;                                  // scratch of a MeansBuilder, items
+  Section bricks;                                           // units; in the buffer, behind what grids have of their own
+  Section masks;  // last in the buffer, so that a shader that reads a word past the last brick stays inside
   std::uint64_t bufferBytes = 0;
   bool inAtlas = false;  // BC7 bricks stay blocks
   AtlasShape shape;
