@@ -245,6 +245,47 @@ TEST(LoadErrors, CountsThatThePagesCannotHold) {
   tryCount(&format::GridFrame::node4Count, 0xffffffffu);
 }
 
+// Each voxel of the means is the average of 8^3 voxels, within half a step of the encoding.
+TEST(LoadMeans, AreAveragesOfTheGrid) {
+  const format::Pack pack = open(everything(format::Compression::fast));
+  LoadRequest request = requestOf(pack);
+  request.means = true;
+  const ReadPages read(request);
+  Counting memory;
+  memory.limit = scratchBound(request);
+  FrameLoader loader(&memory);
+  const auto loaded = loader.load(request, read.pages);
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().message;
+  const FrameReader reader(*loaded);
+  for (std::uint32_t slot = 0; slot < 2; ++slot) {
+    const auto view = GridView::load(pack, pack.gridFrames()[slot]);
+    ASSERT_TRUE(view.has_value());
+    const runtime::LoadedGrid& grid = loaded->grids[slot];
+    EXPECT_EQ(grid.index, Index::flat);
+    const double step = (double{grid.frame.valueMax} - double{grid.frame.valueMin}) / 65535;
+    std::uint64_t active = 0;
+    for (std::int64_t i = 0; i < 70 * 50 * 70; ++i) {
+      const std::int64_t x = i / (50 * 70) - 1, y = i / 70 % 50 - 1, z = i % 70 - 1;
+      double sum = 0;
+      for (std::int64_t v = 0; v < 512; ++v) {
+        sum += double{view->voxel(8 * x + (v >> 6), 8 * y + (v >> 3 & 7), 8 * z + (v & 7))};
+      }
+      const float is = reader.voxel(grid, x, y, z);
+      ASSERT_NEAR(is, sum / 512, step) << x << " " << y << " " << z;
+      active += is != grid.frame.background ? 1 : 0;
+    }
+    EXPECT_EQ(grid.frame.activeVoxels, 57u + 3u * 16 * 16 * 16);
+    EXPECT_GE(grid.frame.activeVoxels, active);
+    // The first voxel's centre lies in the middle of the grid's first 8^3.
+    const double* fine = view->frame().indexToWorld;
+    for (int row = 0; row < 3; ++row) {
+      const double* means = grid.frame.indexToWorld + 4 * row;
+      EXPECT_DOUBLE_EQ(means[3], fine[4 * row + 3] + 3.5 * (fine[4 * row] + fine[4 * row + 1] + fine[4 * row + 2]));
+      EXPECT_DOUBLE_EQ(means[row], 8 * fine[4 * row + row]);
+    }
+  }
+}
+
 // The distances of a flat table, by looking at every pair.
 TEST(LoadIndex, DistancesAreThoseToTheNearestCell) {
   std::mt19937 random(3);
@@ -305,6 +346,7 @@ TEST(LoadErrors, NoBytesOfAPageDoHarm) {
   FrameLoader loader(std::pmr::new_delete_resource());
   for (int round = 0; round < 3000; ++round) {
     request.index = static_cast<Index>(round % 3);
+    request.means = round % 5 == 0;
     request.bc7 = round % 2 == 0;
     ReadPages read(request);
     for (int change = 0; change < 3; ++change) {
