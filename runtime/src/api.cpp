@@ -12,6 +12,10 @@ tl::unexpected<Error> vulkanError(const char* call, VkResult result) {
   return failure(ErrorCode::vulkan, std::string(call) + " failed with VkResult " + std::to_string(result));
 }
 
+Device& deviceOf(Renderer& renderer) {
+  return renderer.device();
+}
+
 bool takeBytes(Device& device, std::uint64_t bytes) {
   std::uint64_t used = device.used;
   do {

@@ -11,12 +11,13 @@
 
 namespace billow::runtime {
 
-#define BILLOW_INSTANCE_FUNCTIONS(X)     \
-  X(vkGetDeviceProcAddr)                 \
-  X(vkGetPhysicalDeviceProperties2)      \
-  X(vkGetPhysicalDeviceMemoryProperties) \
-  X(vkGetPhysicalDeviceFormatProperties) \
-  X(vkGetPhysicalDeviceImageFormatProperties)
+#define BILLOW_INSTANCE_FUNCTIONS(X)          \
+  X(vkGetDeviceProcAddr)                      \
+  X(vkGetPhysicalDeviceProperties2)           \
+  X(vkGetPhysicalDeviceMemoryProperties)      \
+  X(vkGetPhysicalDeviceFormatProperties)      \
+  X(vkGetPhysicalDeviceImageFormatProperties) \
+  X(vkGetPhysicalDeviceQueueFamilyProperties)
 
 #define BILLOW_DEVICE_FUNCTIONS(X) \
   X(vkAllocateCommandBuffers)      \
@@ -108,6 +109,9 @@ struct Device {
   bool bc7 = false;  // BC7 bricks stay BC7, in a sampled 3D image; else they are decoded to uniform bricks of 8 bits
   std::uint32_t leastAtlasBricks = 0;  // as LoadRequest has it
 };
+
+// The renderer's, for parts that share it.
+Device& deviceOf(Renderer& renderer);
 
 // Counts bytes as used, or returns false where they would exceed the budget.
 bool takeBytes(Device& device, std::uint64_t bytes);

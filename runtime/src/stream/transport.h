@@ -44,21 +44,30 @@ struct TransportStats {
   std::uint64_t gpuAllocated = 0, gpuUsed = 0, gpuPeak = 0, cpuBytes = 0, cpuPeak = 0;
 };
 
+// Called from any thread when something changed that the planner may act on: short, and no call into the Transport.
+struct Wake {
+  void (*call)(void* user) = nullptr;  // null: nobody wants to know
+  void* user = nullptr;
+};
+
 // submit(), cancel(), stage(), take() and wanted() are called by the planner, one thread at a time; update(), retire()
-// and wait() by the frame thread; all may run at the same time. `wake` is called from any thread when something
-// changed that the planner may act on.
+// and wait() by the frame thread; all may run at the same time.
 class Transport {
  public:
-  static Result<std::unique_ptr<Transport>> create(Device& device, const StreamConfig& config, JobSystem wake);
-  virtual ~Transport() = default;  // waits for own threads and reads in flight; frames must be gone before
+  static Result<std::unique_ptr<Transport>> create(Device& device, const StreamConfig& config, const Wake& wake);
+  // Waits for own threads, jobs that the host's system has begun, reads in flight, and the uploads that were submitted
+  // (some seconds at most). Frames must be gone before, save for those that were retired.
+  virtual ~Transport() = default;
 
   // Most device bytes that the frame takes, alignment included, and most scratch on the CPU: from the tables alone.
   struct Cost {
     std::uint64_t gpu = 0, cpu = 0;
   };
+  // Zero where the tables contradict themselves: the load will say how.
   virtual Cost cost(const LoadOrder& order) const = 0;
 
-  // False where its scratch does not fit beside what is in flight now: ask again after a wake. Loads are worked on in
+  // False where its scratch does not fit beside what is in flight now: ask again after a wake. What could not ever fit,
+  // is out of range, or comes after a failure of the device, is taken and arrives as an error. Loads are worked on in
   // order of submission.
   virtual bool submit(const LoadOrder& order) = 0;
   // The load ends soon, without an arrival.
@@ -67,6 +76,9 @@ class Transport {
   virtual void take(std::vector<Arrival>& arrivals) = 0;
   // Device bytes that loads wait for because no block has room: the planner must evict, or cancel them.
   virtual std::uint64_t wantedGpuBytes() const = 0;
+  // Whether the frame lies in memory that must be given back because the budget shrank: evict it, and load it anew if
+  // it is needed.
+  virtual bool mustLeave(const ResidentFrame& frame) const = 0;
 
   // On the frame thread, once an update(): counts it, frees what was retired framesInFlight updates ago, and submits
   // uploads where Submission is inUpdate. Never waits.
@@ -80,7 +92,8 @@ class Transport {
   virtual bool reserveCpu(std::uint64_t bytes) = 0;
   virtual void releaseCpu(std::uint64_t bytes) = 0;
   virtual TransportStats stats() const = 0;
-  // Runs job(context) on billow's threads or the host's.
+  // Runs job(context) on billow's threads or the host's; never where the Transport is destroyed before its turn. Throws
+  // std::bad_alloc.
   virtual void run(void (*job)(void* context), void* context) = 0;
 };
 

@@ -70,9 +70,9 @@ struct HostDevice {
   const VkAllocationCallbacks* allocationCallbacks = nullptr;
 };
 
-// What becomes of BC7 bricks. Automatic: they stay blocks where the device samples such 3D images fast and the frame has
-// enough of them to fill one, else they are decoded to uniform bricks of 8 bits, as on software devices. native: blocks
-// wherever the device samples them.
+// What becomes of BC7 bricks. Automatic: they stay blocks where the device samples such 3D images fast and the frame
+// has enough of them to fill one, else they are decoded to uniform bricks of 8 bits, as on software devices. native:
+// blocks wherever the device samples them.
 enum class BlockUse { automatic, native, decoded };
 
 struct Config {
@@ -243,6 +243,7 @@ class Renderer {
   friend class Metavoxels;  // metavoxel.h
   friend class Compositor;  // composite.h
   friend class Streamer;    // stream.h
+  friend Device& deviceOf(Renderer& renderer);
   virtual Device& device() = 0;
 };
 
