@@ -26,7 +26,9 @@ struct uvec4 {
 BILLOW_GPU_CONST kExtinctionSlot = 0u;
 BILLOW_GPU_CONST kTemperatureSlot = 1u;
 BILLOW_GPU_CONST kFlamesSlot = 2u;
-BILLOW_GPU_CONST kGridSlots = 3u;
+BILLOW_GPU_CONST kMatterSlots = 3u;    // those above: what light meets
+BILLOW_GPU_CONST kVelocityXSlot = 3u;  // and y and z; in kGrids only where matter is carried along them
+BILLOW_GPU_CONST kGridSlots = 6u;
 
 // How a grid's cells of 8^3 voxels are found. `mixed` asks each grid.
 BILLOW_GPU_CONST kIndexFlat = 0u;
@@ -73,9 +75,11 @@ struct MarchParams {
   vec4 background[2];  // linear RGB at the picture's bottom and top
   uvec4 size;          // width, height, shadow steps at most, jitter (0 or 1)
   uvec4 bricks;        // log2 of the BC7 atlas's slots along x | along y << 8; 0; address of the slots of 32 bytes
-  GridParams grids[3];
+  vec4 flow[3];        // rows: by how much a velocity has carried matter, in voxels of the space of metavoxels, or else
+                       // world units; w: at most
+  GridParams grids[6];
 };
-BILLOW_GPU_SIZE(MarchParams, 13 * 16 + 3 * 160);
+BILLOW_GPU_SIZE(MarchParams, 16 * 16 + 6 * 160);
 
 #ifdef __cplusplus
 }  // namespace billow::runtime::gpu

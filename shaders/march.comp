@@ -27,7 +27,7 @@ struct Sum {
 // (1 - exp(-s dt)) / s (Hillaire 2015, "Physically based and unified volumetric rendering in Frostbite").
 void shade(Ray rays[3], vec3 direction, float t, float dt, inout Sum sum) {
   float value[3];
-  for (uint g = 0u; g < kGridSlots; ++g) {
+  for (uint g = 0u; g < kMatterSlots; ++g) {
     value[g] = hasGrid(g) ? sampleGrid(g, rays[g].origin + rays[g].direction * t, kFilter) : 0.0;
   }
   const float extinction = extinctionOf(value[extinctionSlot()]);
@@ -55,7 +55,7 @@ float interleavedNoise(vec2 pixel) { return fract(52.9829189 * fract(dot(pixel, 
 // Length of a step that starts at distance t: so many voxels, but never less than a pixel.
 float stepLength(Ray rays[3], float t) {
   float voxel = kFar;
-  for (uint g = 0u; g < kGridSlots; ++g) {
+  for (uint g = 0u; g < kMatterSlots; ++g) {
     if (hasGrid(g)) voxel = min(voxel, 1.0 / length(rays[g].direction));
   }
   return max(params.forward.w * voxel, t * params.right.w);
@@ -63,7 +63,7 @@ float stepLength(Ray rays[3], float t) {
 
 float nextOccupied(Ray rays[3], float t) {
   float next = kFar;
-  for (uint g = 0u; g < kGridSlots; ++g) {
+  for (uint g = 0u; g < kMatterSlots; ++g) {
     if (hasGrid(g)) next = min(next, skipEmpty(g, rays[g], t));
   }
   return next;
@@ -71,7 +71,7 @@ float nextOccupied(Ray rays[3], float t) {
 
 float endOfGrids(Ray rays[3]) {
   float end = 0.0;
-  for (uint g = 0u; g < kGridSlots; ++g) {
+  for (uint g = 0u; g < kMatterSlots; ++g) {
     const vec2 range = crossGrid(g, rays[g]);
     if (hasGrid(g) && range.x < range.y) end = max(end, range.y);
   }
@@ -80,7 +80,7 @@ float endOfGrids(Ray rays[3]) {
 
 Sum march(vec3 direction, vec2 pixel) {
   Ray rays[3];
-  for (uint g = 0u; g < kGridSlots; ++g) rays[g] = makeRay(g, vec3(0.0), direction);
+  for (uint g = 0u; g < kMatterSlots; ++g) rays[g] = makeRay(g, vec3(0.0), direction);
   Sum sum = Sum(vec3(0.0), 1.0, 0.0, vec3(-1.0));
   const float end = endOfGrids(rays);
   // Not below 1/8: a step far below the others would only cost time.

@@ -9,9 +9,9 @@ layout(set = 1, binding = 0, std140) uniform MetavoxelBlock { MetavoxelParams me
 
 layout(push_constant) uniform PassBlock {
   uint round;    // of the pool; of the light field's passes: how often light has been scattered on
-  uint volume;   // number, of passes for one volume
+  uint volume;   // number, of passes for one layer of a volume
   uint finish;   // 1: the picture is complete after this round
-  uint level;    // of the light field's pyramid
+  uint level;    // of the light field's pyramid; of the pass that fills, number of the volume's layer
   uvec4 box;     // first cell of the volume's box, of the pass that bins it; 0
 }
 pass;

@@ -1,4 +1,5 @@
-// A volume into cells, a workgroup a cell of the volume's box: whether any brick or tile lies in it.
+// A layer of a volume into cells, a workgroup a cell of the layer's box: whether any brick or tile lies in it, or so
+// near that it may be carried into it.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_buffer_reference : require
@@ -15,7 +16,7 @@ void main() {
   if (!cellWanted(cell)) return;
   vec3 low, high;
   grownCell(cell, low, high);
-  if (!volumeHas(low, high) || gl_LocalInvocationIndex != 0u) return;
+  if (!volumeHas(low - farthest(), high + farthest()) || gl_LocalInvocationIndex != 0u) return;
   const uint number = cellNumber(cell);
   noteCell(number, atomicOr(Words(meta.cells.xy).items[number], 1u << (kVolumeBit + pass.volume)));
 }

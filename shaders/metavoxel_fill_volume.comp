@@ -1,4 +1,4 @@
-// One volume into the metavoxels of a round.
+// One layer of a volume into the metavoxels of a round.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_buffer_reference : require
@@ -7,30 +7,20 @@
 
 #include "medium.glsl"
 #include "metavoxel_block.glsl"
+#include "metavoxel_carry.glsl"
 #include "metavoxel_stage.glsl"
 
 const int kMostSamples = 4;  // an axis
 
-vec3 indexAlong(uint g, vec3 way) {
-  return vec3(dot(params.grids[g].toIndex[0].xyz, way), dot(params.grids[g].toIndex[1].xyz, way),
-              dot(params.grids[g].toIndex[2].xyz, way));
-}
-
 // Samples along an axis: a voxel of the space that spans several of the grid's takes their mean.
 int samplesAlong(vec3 step) { return clamp(int(ceil(length(step) - 0.25)), 1, kMostSamples); }
-
-vec3 indexOf(uint g, vec3 world) {
-  return indexAlong(g, world) +
-         vec3(params.grids[g].toIndex[0].w, params.grids[g].toIndex[1].w, params.grids[g].toIndex[2].w);
-}
-float readGrid(uint g, vec3 world) { return sampleGrid(g, indexOf(g, world), kFilterTrilinear); }
 
 bool burning() { return hasGrid(kTemperatureSlot) || hasGrid(kFlamesSlot); }
 
 // Samples of a texel along each axis, for what is linear in its grid.
 ivec3 samplesOf() {
   ivec3 count = ivec3(1);
-  for (uint g = 0u; g < kGridSlots; ++g) {
+  for (uint g = 0u; g < kMatterSlots; ++g) {
     if (!hasGrid(g)) continue;
     for (int axis = 0; axis < 3; ++axis) {
       count[axis] = max(count[axis], samplesAlong(indexAlong(g, meta.toWorld[axis].xyz)));
@@ -60,8 +50,8 @@ Texel sampleVolume(vec3 voxel, ivec3 count) {
   vec3 emission = vec3(0.0);
   for (int i = 0; i < samples && (burning() || !sharp); ++i) {
     const vec3 place = world + sampleShift(i, count);
-    float value[3];
-    for (uint g = 0u; g < kGridSlots; ++g) {
+    float value[kMatterSlots];
+    for (uint g = 0u; g < kMatterSlots; ++g) {
       const bool read = hasGrid(g) && !(sharp && g == kExtinctionSlot);
       value[g] = read ? readGrid(g, place) : 0.0;
     }
@@ -74,14 +64,14 @@ Texel sampleVolume(vec3 voxel, ivec3 count) {
 // The same for both texels of each thread, 2^3 samples each, from staged values. One grid is staged at a time.
 const int kStagedSamples = 8;
 
-void sampleStaged(Block block, Stage temperature, Stage flames, out Texel values[2]) {
+void sampleStaged(vec3 voxels[2], Stage temperature, Stage flames, out Texel values[2]) {
   float heat[2 * kStagedSamples];
   float extinction[2] = float[2](0.0, 0.0);
   vec3 emission[2] = vec3[2](vec3(0.0), vec3(0.0));
   const uint source = extinctionSlot();
   vec3 middle[2];
   for (uint i = 0u; i < 2u; ++i) {
-    middle[i] = worldOf(texelVoxel(block.cell, texelOf(block, i)));
+    middle[i] = worldOf(voxels[i]);
     if (source == kExtinctionSlot) {
       extinction[i] = extinctionOf(readGrid(source, middle[i])) * float(kStagedSamples);
     }
@@ -104,18 +94,19 @@ void sampleStaged(Block block, Stage temperature, Stage flames, out Texel values
   }
 }
 
-void sampleBlock(Block block, vec3 from, vec3 to, out Texel values[2]) {
+// `voxels` are where the thread's texels read, all of the group's between `from` and `to`.
+void sampleBlock(vec3 voxels[2], vec3 from, vec3 to, out Texel values[2]) {
   const ivec3 count = samplesOf();
   if (burning() && count == ivec3(1)) {
     const Stage temperature = stageOf(kTemperatureSlot, from, to);
     const Stage flames = stageOf(kFlamesSlot, from, to);
     const bool fit = (!hasGrid(kTemperatureSlot) || fits(temperature)) && (!hasGrid(kFlamesSlot) || fits(flames));
     if (fit) {
-      sampleStaged(block, temperature, flames, values);
+      sampleStaged(voxels, temperature, flames, values);
       return;
     }
   }
-  for (uint i = 0u; i < 2u; ++i) values[i] = sampleVolume(texelVoxel(block.cell, texelOf(block, i)), count);
+  for (uint i = 0u; i < 2u; ++i) values[i] = sampleVolume(voxels[i], count);
 }
 
 void main() {
@@ -124,14 +115,20 @@ void main() {
   const Block block = blockOf(item);
   const uint volumes = wordOf(item.y) >> kVolumeBit;
   if ((volumes >> pass.volume & 1u) == 0u) return;
-  const bool first = (volumes & ((1u << pass.volume) - 1u)) == 0u;
+  const bool first = (volumes & ((1u << pass.volume) - 1u)) == 0u && pass.level == 0u;
   const bool stale = (blockHolds(block.slot, block.at) & kBlockStale) != 0u;
   const vec3 middle = texelVoxel(block.cell, block.texel);
-  const vec3 from = middle - 0.5;
-  const vec3 to = middle + float(kSubBlock) - 0.5;
-  const bool some = volumeHas(from, to);
+  vec3 from = middle - 0.5;
+  vec3 to = middle + float(kSubBlock) - 0.5;
+  bool some = volumeHas(from - farthest(), to + farthest());
+  vec3 voxels[2];
+  for (uint i = 0u; i < 2u; ++i) voxels[i] = texelVoxel(block.cell, texelOf(block, i));
+  if (carries() && some) {
+    carryBack(voxels, from, to);
+    some = volumeHas(from, to);
+  }
   if (!some && !(first && stale)) return;
   Texel values[2] = Texel[2](Texel(vec3(0.0), 0.0, vec3(0.0)), Texel(vec3(0.0), 0.0, vec3(0.0)));
-  if (some) sampleBlock(block, from, to, values);
+  if (some) sampleBlock(voxels, from, to, values);
   storeBlock(block, values, first);
 }

@@ -1,4 +1,4 @@
-// Whether a volume has anything in a box of voxels of the space; all threads of a workgroup look.
+// Whether a layer of a volume has anything in a box of voxels of the space; all threads of a workgroup look.
 #ifndef BILLOW_METAVOXEL_VOLUME
 #define BILLOW_METAVOXEL_VOLUME
 
@@ -6,6 +6,10 @@
 #include "metavoxel.glsl"
 
 shared uint found;
+
+// Whether matter is carried along velocities, and by how many voxels of the space at most.
+bool carries() { return kGrids >> kVelocityXSlot != 0u; }
+vec3 farthest() { return carries() ? vec3(params.flow[0].w, params.flow[1].w, params.flow[2].w) : vec3(0.0); }
 
 // Pack index box of what a filtered read between `a` and `b` may touch. Its corners bound it, for the map is affine.
 void indexBox(uint g, vec3 a, vec3 b, out vec3 low, out vec3 high) {
@@ -41,7 +45,7 @@ bool anythingIn(uint g, vec3 from, vec3 to) {
 bool volumeHas(vec3 from, vec3 to) {
   if (gl_LocalInvocationIndex == 0u) found = 0u;
   barrier();
-  for (uint g = 0u; g < kGridSlots; ++g) {
+  for (uint g = 0u; g < kMatterSlots; ++g) {
     if (hasGrid(g) && found == 0u && anythingIn(g, from, to)) atomicOr(found, 1u);
   }
   barrier();

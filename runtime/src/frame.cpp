@@ -123,7 +123,13 @@ Result<FrameIndices> frameIndices(const format::Pack& pack, const format::Volume
 }
 
 bool ResidentFrame::empty() const {
-  return std::none_of(grids_.begin(), grids_.end(), [](const ResidentGrid& grid) { return grid.present; });
+  return std::none_of(grids_.begin(), grids_.begin() + gpu::kMatterSlots,
+                      [](const ResidentGrid& grid) { return grid.present; });
+}
+
+FrameIndices matterOf(FrameIndices indices) {
+  std::fill(indices.begin() + gpu::kMatterSlots, indices.end(), std::nullopt);
+  return indices;
 }
 
 Result<LoadedFrame> readFrame(const Device& device, const format::Pack& pack, std::uint32_t volume, std::uint32_t frame,

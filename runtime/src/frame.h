@@ -27,6 +27,9 @@ struct ResidentGrid {
 // By slot: the index of each grid that the frame has; pipelines are made for it.
 using FrameIndices = std::array<std::optional<Index>, gpu::kGridSlots>;
 
+// Without those of velocity grids: what a pipeline that carries nothing is made for.
+FrameIndices matterOf(FrameIndices indices);
+
 // What a frame's bytes lie in; given back when it is destroyed.
 class FrameMemory {
  public:

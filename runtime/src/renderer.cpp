@@ -101,7 +101,8 @@ class RendererImpl final : public Renderer {
       for (std::uint32_t frame = 0; frame < pack.volumes()[volume].frameCount; ++frame) {
         const auto indices = frameIndices(pack, pack.volumes()[volume], frame, options);
         if (!indices) return tl::unexpected(indices.error());
-        const auto made = passes_.pipeline(passKey(*indices, marchOf(colorFormat), quality.filter, quality.shadows));
+        const auto made =
+            passes_.pipeline(passKey(matterOf(*indices), marchOf(colorFormat), quality.filter, quality.shadows));
         if (!made) return tl::unexpected(made.error());
       }
       return {};
@@ -132,7 +133,8 @@ class RendererImpl final : public Renderer {
   Result<void> recordMarch(VkCommandBuffer commands, const DrawInfo& draw) {
     if (const char* field = badField(draw)) return failure(ErrorCode::argument, badMessage(field));
     const auto& frame = static_cast<const ResidentFrame&>(*draw.frame);
-    const PassKey key = passKey(frame.indices(), marchOf(draw.colorFormat), draw.quality.filter, draw.quality.shadows);
+    const PassKey key =
+        passKey(matterOf(frame.indices()), marchOf(draw.colorFormat), draw.quality.filter, draw.quality.shadows);
     const auto pipeline = passes_.pipeline(key);
     if (!pipeline) return tl::unexpected(pipeline.error());
     const DebugLabel label(device_.api, commands, "billow march");

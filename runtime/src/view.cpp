@@ -55,4 +55,15 @@ GridChoice chooseGrids(const format::Pack& pack, const format::VolumeRecord& vol
   return choice;
 }
 
+GridChoice withVelocity(const format::Pack& pack, const format::VolumeRecord& volume, GridChoice choice) {
+  const auto grids = pack.gridsOf(volume);
+  for (std::uint32_t i = static_cast<std::uint32_t>(grids.size()); i-- > 0;) {
+    const auto role = static_cast<format::Role>(grids[i].role);
+    if (role == format::Role::velocityX) choice.velocityX = i;
+    if (role == format::Role::velocityY) choice.velocityY = i;
+    if (role == format::Role::velocityZ) choice.velocityZ = i;
+  }
+  return choice;
+}
+
 }  // namespace billow::runtime

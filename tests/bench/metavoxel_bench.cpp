@@ -46,6 +46,8 @@ struct Scene {
   bool kept = false;         // only what changed is filled
   std::uint32_t moving = 0;  // of the spheres, from draw to draw
   std::uint32_t lightField = 0;
+  std::uint32_t layers = 1;  // of the volume, of as many frames
+  bool carried = false;      // along a velocity
 };
 
 constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
@@ -65,6 +67,9 @@ constexpr Scene kScenes[] = {
     {"the same, 100 move", 1000, true, 34, 300, 3072 * kMiB, true, 100},
     {"the same, all move", 1000, true, 34, 300, 3072 * kMiB, true, 1000},
     {"volume alone, light field", 0, true, 34, 300, 3072 * kMiB, false, 0, 136},
+    {"volume, 2 layers", 0, true, 34, 300, 3072 * kMiB, false, 0, 0, 2},
+    {"volume, carried", 0, true, 34, 300, 3072 * kMiB, false, 0, 0, 1, true},
+    {"volume, 2 layers, carried", 0, true, 34, 300, 3072 * kMiB, false, 0, 0, 2, true},
     {"1000, volume, light field", 1000, true, 34, 300, 3072 * kMiB, false, 0, 136},
     {"the same, of half as fine", 1000, true, 34, 300, 3072 * kMiB, false, 0, 68},
     {"the same, 192 MB", 1000, true, 34, 300, 192 * kMiB, false, 0, 68},
@@ -224,13 +229,40 @@ void writePicture(const std::string& path, const headless::Picture& picture) {
   std::fclose(file);
 }
 
+// The velocity that the volume has, or a made one: of the values that its other grids have along each axis.
+runtime::GridChoice carriedGrids(const format::Pack& pack, const format::VolumeRecord& volume,
+                                 const runtime::GridChoice& grids) {
+  runtime::GridChoice choice = runtime::withVelocity(pack, volume, grids);
+  const std::uint32_t other = grids.temperature != format::kNone ? grids.temperature : grids.extinction;
+  for (std::uint32_t* axis : {&choice.velocityX, &choice.velocityY, &choice.velocityZ}) {
+    if (*axis == format::kNone) *axis = other;
+  }
+  return choice;
+}
+
+// World units a second that a velocity's 1 must be for `voxels` voxels a second where it is largest.
+float velocityScale(const format::Pack& pack, const format::VolumeRecord& volume, const runtime::GridChoice& grids,
+                    std::uint32_t frame, double voxels) {
+  const format::GridFrame& grid = pack.gridFrame(volume, frame, grids.velocityX);
+  const float most = std::max(std::abs(grid.valueMin), std::abs(grid.valueMax));
+  return static_cast<float>(voxels * std::abs(grid.indexToWorld[0])) / std::max(most, 1e-6f);
+}
+
 void measure(headless::Headless& gpu, const format::Pack& pack, const Options& options, const Scene& scene,
              const format::EffectTables& tables) {
   const format::VolumeRecord& volume = pack.volumes()[0];
   const runtime::GridChoice grids = runtime::chooseGrids(pack, volume);
   const auto renderer = valueOf(runtime::Renderer::create(gpu.host(), {.gpuBudget = std::uint64_t{8} << 30}));
   const std::uint32_t frameIndex = options.frame != format::kNone ? options.frame : volume.frameCount / 2;
-  const auto frame = valueOf(renderer->upload(pack, 0, frameIndex, {.grids = grids}));
+  const runtime::GridChoice uploaded = scene.carried ? carriedGrids(pack, volume, grids) : grids;
+  std::vector<std::unique_ptr<runtime::Frame>> frames;
+  std::vector<runtime::Layer> layers;
+  for (std::uint32_t i = 0; i < scene.layers; ++i) {
+    const std::uint32_t index = std::min(frameIndex + i, volume.frameCount - 1);
+    frames.push_back(valueOf(renderer->upload(pack, 0, index, {.grids = uploaded})));
+    const float share = 1 / static_cast<float>(scene.layers);
+    layers.push_back({frames.back().get(), share, scene.carried ? 0.5f - static_cast<float>(i) : 0});
+  }
   const runtime::MetavoxelConfig config{.metavoxels = scene.metavoxels,
                                         .memoryBudget = scene.budget,
                                         .maxMetavoxels = 6144,
@@ -256,7 +288,9 @@ void measure(headless::Headless& gpu, const format::Pack& pack, const Options& o
   draw.width = options.width;
   draw.height = options.height;
   const std::vector<runtime::MetavoxelVolume> volumes{
-      {.frame = frame.get(), .look = valueOf(runtime::suggestLook(pack, volume, grids))}};
+      {.layers = layers,
+       .velocityScale = scene.carried ? velocityScale(pack, volume, uploaded, frameIndex, 6) : 1,
+       .look = valueOf(runtime::suggestLook(pack, volume, grids))}};
   if (scene.volume) draw.volumes = volumes;
   if (scene.kept) draw.refill = runtime::Refill::changed;
   std::vector<format::Particle> particles = dust(scene, draw.center, voxel);

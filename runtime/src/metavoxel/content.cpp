@@ -37,11 +37,12 @@ std::uint32_t hashOf(const Space& space) {
   return std::max(hash.both()[0], 1u);
 }
 
-std::array<std::uint32_t, 2> hashOf(const PlacedVolume& volume, std::uint64_t frameNumber) {
-  const gpu::MarchParams& params = volume.params;
+std::array<std::uint32_t, 2> hashOf(const PlacedLayer& layer, std::uint64_t frameNumber) {
+  const gpu::MarchParams& params = layer.params;
   Hash hash;
   hash.add(frameNumber);  // addresses are given to one frame after another
   hash.add(params.grids);
+  hash.add(params.flow);
   hash.add(params.ambient.w);
   hash.add(params.albedo);
   hash.add(params.emission);

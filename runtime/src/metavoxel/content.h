@@ -9,8 +9,8 @@ namespace billow::runtime {
 // Of where the cells lie. Never 0.
 std::uint32_t hashOf(const Space& space);
 
-// Of all that a volume's matter depends on, but not of the view. Low, high.
-std::array<std::uint32_t, 2> hashOf(const PlacedVolume& volume, std::uint64_t frameNumber);
+// Of all that a layer's matter depends on, but not of the view. Low, high; those of several layers add.
+std::array<std::uint32_t, 2> hashOf(const PlacedLayer& layer, std::uint64_t frameNumber);
 
 }  // namespace billow::runtime
 

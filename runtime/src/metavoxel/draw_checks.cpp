@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "checks.h"
+#include "layers.h"
 
 namespace billow::runtime {
 
@@ -38,7 +39,8 @@ Result<void> checkDraw(const MetavoxelDraw& draw, const MetavoxelConfig& config)
   if (draw.particles.size() > config.maxParticles) return badArgument("particles: their number");
   for (std::size_t i = 0; i < draw.volumes.size(); ++i) {
     const std::string name = "volumes[" + std::to_string(i) + "].";
-    if (draw.volumes[i].frame == nullptr) return badArgument(name + "frame");
+    if (const char* field = badLayers(draw.volumes[i].frame, draw.volumes[i].layers)) return badArgument(name + field);
+    if (!std::isfinite(draw.volumes[i].velocityScale)) return badArgument(name + "velocityScale");
     if (const char* field = badLook(draw.volumes[i].look)) return badArgument(name + field);
   }
   return {};

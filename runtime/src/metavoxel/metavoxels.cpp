@@ -122,10 +122,8 @@ class MetavoxelsImpl final : public Metavoxels {
     if (config_.keepFilled) {
       if (auto made = makeAll(kept, {}); !made) return tl::unexpected(made.error());
     }
-    for (std::size_t i = 0; i < draw.volumes.size(); ++i) {
-      auto volume = prepareVolume(steps.space, draw, i);
-      if (!volume) return tl::unexpected(volume.error());
-      steps.volumes.push_back(*volume);
+    for (std::uint32_t i = 0; i < draw.volumes.size(); ++i) {
+      if (auto prepared = prepareVolume(draw, i, steps); !prepared) return tl::unexpected(prepared.error());
     }
     return steps;
   }
@@ -151,19 +149,26 @@ class MetavoxelsImpl final : public Metavoxels {
     return {};
   }
 
-  Result<VolumeSteps> prepareVolume(const Space& space, const MetavoxelDraw& draw, std::size_t number) {
-    const auto& frame = static_cast<const ResidentFrame&>(*draw.volumes[number].frame);
-    VolumeSteps steps;
-    if (frame.empty()) return steps;
-    steps.placed = placeVolume(space, draw, draw.volumes[number]);
-    if (!steps.placed) return badArgument("volumes[" + std::to_string(number) + "].objectToWorld");
-    const auto bin = pipelines_.pipeline(MetavoxelPass::binVolume, {}, frame.indices());
-    if (!bin) return tl::unexpected(bin.error());
-    const auto fill = pipelines_.pipeline(MetavoxelPass::fillVolume, variantOf(draw), frame.indices());
-    if (!fill) return tl::unexpected(fill.error());
-    steps.bin = *bin;
-    steps.fill = *fill;
-    return steps;
+  Result<void> prepareVolume(const MetavoxelDraw& draw, std::uint32_t number, DrawSteps& steps) {
+    const MetavoxelVolume& volume = draw.volumes[number];
+    std::uint32_t drawn = 0;
+    for (const Layer& layer : layersOf(volume.frame, volume.layers)) {
+      const auto placed = placeLayer(steps.space, draw, volume, layer);
+      if (!placed) return badArgument("volumes[" + std::to_string(number) + "].objectToWorld");
+      if (!placed->cells) continue;
+      const FrameIndices indices = indicesOf(layer);
+      const auto bin = pipelines_.pipeline(MetavoxelPass::binVolume, {}, indices);
+      if (!bin) return tl::unexpected(bin.error());
+      const auto fill = pipelines_.pipeline(MetavoxelPass::fillVolume, variantOf(draw), indices);
+      if (!fill) return tl::unexpected(fill.error());
+      steps.layers.push_back({.placed = *placed,
+                              .frame = &frameOf(layer),
+                              .volume = number,
+                              .layer = drawn++,
+                              .bin = *bin,
+                              .fill = *fill});
+    }
+    return {};
   }
 
   // What the host writes for a draw: parameters and particles.
@@ -175,8 +180,8 @@ class MetavoxelsImpl final : public Metavoxels {
     const auto placed = paramsOf(steps.space, draw, config_, resources_.sizes(), draws_ + 1);
     if (!placed) return badArgument("sceneShadow.worldToMap");
     put(upload.view, viewOf(draw));
-    for (std::size_t i = 0; i < steps.volumes.size(); ++i) {
-      if (steps.volumes[i].drawn()) put(upload.volumes + i * kMarchStride, steps.volumes[i].placed->params);
+    for (std::size_t i = 0; i < steps.layers.size(); ++i) {
+      put(upload.layers + i * kMarchStride, steps.layers[i].placed.params);
     }
     gpu::MetavoxelParams params = *placed;
     resources_.addAddresses(params);
@@ -184,16 +189,16 @@ class MetavoxelsImpl final : public Metavoxels {
     params.spawn.z = static_cast<std::uint32_t>(steps.spawns.jobs.size());
     params.spawn.w = steps.spawns.candidates;
     params.matter.z = hashOf(steps.space);
-    for (std::size_t i = 0; i < steps.volumes.size(); ++i) {
-      if (!steps.volumes[i].drawn()) continue;
-      const auto& frame = static_cast<const ResidentFrame&>(*draw.volumes[i].frame);
-      const auto hash = hashOf(*steps.volumes[i].placed, frame.number_);
-      gpu::uvec4& two = params.contents[i / 2];
-      (i % 2 == 0 ? two.x : two.z) = hash[0];
-      (i % 2 == 0 ? two.y : two.w) = hash[1];
+    std::vector<VkImageView> atlases;
+    for (const LayerSteps& layer : steps.layers) {
+      const auto hash = hashOf(layer.placed, layer.frame->number_);
+      gpu::uvec4& two = params.contents[layer.volume / 2];
+      (layer.volume % 2 == 0 ? two.x : two.z) += hash[0];
+      (layer.volume % 2 == 0 ? two.y : two.w) += hash[1];
+      atlases.push_back(layer.frame->atlas_);
     }
     put(upload.space, params);
-    pipelines_.write(resources_, next_, draw);
+    pipelines_.write(resources_, next_, draw, atlases);
     return {};
   }
 

@@ -126,7 +126,7 @@ Result<void> MetavoxelPipelines::createLayouts() {
 }
 
 Result<void> MetavoxelPipelines::createSets() {
-  const std::uint32_t matters = inFlight_ * (volumes_ + 1);
+  const std::uint32_t matters = inFlight_ * (layers_ + 1);
   const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, matters + inFlight_},
                                         {VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE, matters + inFlight_},
                                         {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 4 * inFlight_},
@@ -177,7 +177,8 @@ Result<VkPipeline> MetavoxelPipelines::pipeline(MetavoxelPass pass, PassVariant 
   return made;
 }
 
-void MetavoxelPipelines::write(const MetavoxelResources& resources, std::uint32_t inFlight, const MetavoxelDraw& draw) {
+void MetavoxelPipelines::write(const MetavoxelResources& resources, std::uint32_t inFlight, const MetavoxelDraw& draw,
+                               std::span<const VkImageView> atlases) {
   const MetavoxelUpload upload = resources.uploadOf(inFlight);
   const VkBuffer uploads = resources.uploads.handle();
   const VkDescriptorBufferInfo spaceParams{uploads, upload.space, sizeof(gpu::MetavoxelParams)};
@@ -210,12 +211,12 @@ void MetavoxelPipelines::write(const MetavoxelResources& resources, std::uint32_
     writes[i] = writeOf(space_[inFlight], i, typeOf(i), &spaceParams, &images[i]);
   }
   device_.api.vkUpdateDescriptorSets(device_.host.device, kCount, writes, 0, nullptr);
-  for (std::uint32_t i = 0; i <= draw.volumes.size(); ++i) {
+  for (std::uint32_t i = 0; i <= atlases.size(); ++i) {
     const VkDescriptorBufferInfo params{uploads, upload.view + i * kMarchStride, sizeof(gpu::MarchParams)};
     // The view has no atlas; the pool is an image of its kind.
     VkDescriptorImageInfo atlas{VK_NULL_HANDLE, resources.pool.view(), VK_IMAGE_LAYOUT_GENERAL};
     if (i > 0) {
-      atlas.imageView = static_cast<const ResidentFrame&>(*draw.volumes[i - 1].frame).atlas_;
+      atlas.imageView = atlases[i - 1];
       atlas.imageLayout = VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL;
     }
     const VkDescriptorSet set = matter(inFlight, i);
@@ -231,11 +232,11 @@ void MetavoxelPipelines::bind(VkCommandBuffer commands, VkDescriptorSet first, V
 }
 
 void MetavoxelPipelines::bindView(VkCommandBuffer commands, std::uint32_t inFlight) const {
-  bind(commands, matter_[inFlight * (volumes_ + 1)], space_[inFlight]);
+  bind(commands, matter_[inFlight * (layers_ + 1)], space_[inFlight]);
 }
 
-void MetavoxelPipelines::bindVolume(VkCommandBuffer commands, std::uint32_t inFlight, std::uint32_t volume) const {
-  bind(commands, matter_[inFlight * (volumes_ + 1) + volume + 1], space_[inFlight]);
+void MetavoxelPipelines::bindLayer(VkCommandBuffer commands, std::uint32_t inFlight, std::uint32_t layer) const {
+  bind(commands, matter_[inFlight * (layers_ + 1) + layer + 1], space_[inFlight]);
 }
 
 void MetavoxelPipelines::push(VkCommandBuffer commands, const PassPush& push) const {

@@ -55,7 +55,7 @@ class MetavoxelPipelines {
   MetavoxelPipelines(Device& device, const MetavoxelConfig& config)
       : device_(device),
         inFlight_(config.recordsInFlight),
-        volumes_(config.maxVolumes),
+        layers_(config.maxVolumes * kMostLayers),
         uses_(config.tables != nullptr ? usesOf(config.tables->materials) : 0),
         field_(config.lightField != 0) {}
   MetavoxelPipelines(const MetavoxelPipelines&) = delete;
@@ -63,14 +63,15 @@ class MetavoxelPipelines {
   ~MetavoxelPipelines();
 
   Result<void> create();
-  // The passes of one volume are made for the grids and indices of its frame; others have none.
+  // The passes of one layer are made for the grids that it reads and their indices; others have none.
   Result<VkPipeline> pipeline(MetavoxelPass pass, PassVariant variant, const FrameIndices& indices = {});
 
-  // Writes the sets of one draw in flight.
-  void write(const MetavoxelResources& resources, std::uint32_t inFlight, const MetavoxelDraw& draw);
-  // Binds a draw's space and its view, or one of its volumes.
+  // Writes the sets of one draw in flight, whose layers have these atlases.
+  void write(const MetavoxelResources& resources, std::uint32_t inFlight, const MetavoxelDraw& draw,
+             std::span<const VkImageView> atlases);
+  // Binds a draw's space and its view, or one of its layers.
   void bindView(VkCommandBuffer commands, std::uint32_t inFlight) const;
-  void bindVolume(VkCommandBuffer commands, std::uint32_t inFlight, std::uint32_t volume) const;
+  void bindLayer(VkCommandBuffer commands, std::uint32_t inFlight, std::uint32_t layer) const;
   void push(VkCommandBuffer commands, const PassPush& push) const;
 
  private:
@@ -80,19 +81,19 @@ class MetavoxelPipelines {
   Result<void> createSets();
   void bind(VkCommandBuffer commands, VkDescriptorSet first, VkDescriptorSet second) const;
   VkDescriptorSet& matter(std::uint32_t inFlight, std::uint32_t number) {
-    return matter_[inFlight * (volumes_ + 1) + number];
+    return matter_[inFlight * (layers_ + 1) + number];
   }
 
   Device& device_;
   std::uint32_t inFlight_;
-  std::uint32_t volumes_;
+  std::uint32_t layers_;  // of a draw, at most
   std::uint32_t uses_;
   bool field_;
-  VkDescriptorSetLayout matterLayout_ = VK_NULL_HANDLE;  // MarchParams and a volume's atlas
+  VkDescriptorSetLayout matterLayout_ = VK_NULL_HANDLE;  // MarchParams and a frame's atlas
   VkDescriptorSetLayout spaceLayout_ = VK_NULL_HANDLE;   // MetavoxelParams and all images
   VkPipelineLayout layout_ = VK_NULL_HANDLE;
   VkDescriptorPool pool_ = VK_NULL_HANDLE;
-  std::vector<VkDescriptorSet> matter_;  // a draw in flight: the view's, then one a volume
+  std::vector<VkDescriptorSet> matter_;  // a draw in flight: the view's, then one a layer
   std::vector<VkDescriptorSet> space_;   // one a draw in flight
   std::map<Key, VkPipeline> pipelines_;
 };

@@ -66,12 +66,11 @@ void DrawRecorder::bin(const DrawSteps& steps, bool keepFilled) {
                                             (particles + gpu::kBinRow - 1) / gpu::kBinRow, 1};
   const std::uint64_t rank = resources_.sizes().regions.counters + offsetof(gpu::MetavoxelCounters, rank);
   if (particles != 0) dispatch(steps.binCount, {}, groups);
-  for (std::uint32_t i = 0; i < steps.volumes.size(); ++i) {
-    const VolumeSteps& volume = steps.volumes[i];
-    if (!volume.drawn()) continue;
-    const auto& first = volume.placed->cells->first;
-    pipelines_.bindVolume(commands_, inFlight_, i);
-    dispatch(volume.bin, {.volume = i, .box = {first[0], first[1], first[2], 0}}, volume.placed->cells->count);
+  for (std::uint32_t i = 0; i < steps.layers.size(); ++i) {
+    const LayerSteps& layer = steps.layers[i];
+    const auto& first = layer.placed.cells->first;
+    pipelines_.bindLayer(commands_, inFlight_, i);
+    dispatch(layer.bin, {.volume = layer.volume, .box = {first[0], first[1], first[2], 0}}, layer.placed.cells->count);
   }
   pipelines_.bindView(commands_, inFlight_);
   barrier();
@@ -129,13 +128,14 @@ void DrawRecorder::fill(const MetavoxelDraw& draw, const DrawSteps& steps, std::
   PassPush push{.round = round};
   indirect(steps.blocks, push, at + offsetof(gpu::MetavoxelRound, blocks));
   barrier();
-  for (std::uint32_t i = 0; i < steps.volumes.size(); ++i) {
-    if (!steps.volumes[i].drawn()) continue;
-    pipelines_.bindVolume(commands_, inFlight_, i);
-    push.volume = i;
-    indirect(steps.volumes[i].fill, push, at + offsetof(gpu::MetavoxelRound, volumes));
+  for (std::uint32_t i = 0; i < steps.layers.size(); ++i) {
+    pipelines_.bindLayer(commands_, inFlight_, i);
+    push.volume = steps.layers[i].volume;
+    push.level = steps.layers[i].layer;
+    indirect(steps.layers[i].fill, push, at + offsetof(gpu::MetavoxelRound, volumes));
     barrier();
   }
+  push.level = 0;
   pipelines_.bindView(commands_, inFlight_);
   indirect(steps.fill, push, at + offsetof(gpu::MetavoxelRound, fill));
   barrier();

@@ -13,16 +13,17 @@
 
 namespace billow::runtime {
 
-struct VolumeSteps {
-  std::optional<PlacedVolume> placed;
+struct LayerSteps {
+  PlacedLayer placed;
+  const ResidentFrame* frame;
+  std::uint32_t volume, layer;  // number; among those of the volume that are drawn
   VkPipeline bin = VK_NULL_HANDLE, fill = VK_NULL_HANDLE;
-  bool drawn() const { return placed && placed->cells; }
 };
 
-// A draw's pipelines and volumes, all made before anything is recorded.
+// A draw's pipelines and layers, all made before anything is recorded.
 struct DrawSteps {
   Space space;
-  std::vector<VolumeSteps> volumes;
+  std::vector<LayerSteps> layers;  // that reach into the space; those of one volume one after the other
   SpawnPlan spawns;
   std::uint32_t particles;  // the host's and the effects'
   VkPipeline clear, reset, spawn, binCount, binWrite, plan, rank, blocks, fill, sum, light, inject, pyramid, gather,

@@ -93,8 +93,8 @@ std::uint64_t MetavoxelResources::bytes() const {
 
 MetavoxelUpload MetavoxelResources::uploadOf(std::uint32_t inFlight) const {
   const std::uint64_t at = inFlight * uploadStride_;
-  const std::uint64_t space = at + kMarchStride * (1 + volumes_);
-  return {.view = at, .volumes = at + kMarchStride, .space = space, .particles = space + kMarchStride};
+  const std::uint64_t space = at + kMarchStride * (1 + layers_);
+  return {.view = at, .layers = at + kMarchStride, .space = space, .particles = space + kMarchStride};
 }
 
 void MetavoxelResources::addAddresses(gpu::MetavoxelParams& params) const {
@@ -128,11 +128,11 @@ Result<void> MetavoxelResources::create(const MetavoxelConfig& config) {
                                             " cube maps; this device takes " +
                                             std::to_string(device_.maxImageExtent3D / gpu::kCubeLayers));
   }
-  volumes_ = config.maxVolumes;
+  layers_ = config.maxVolumes * kMostLayers;
   hasRadii_ = config.tables != nullptr && format::haveRadii(config.tables->tracks);
   const std::uint64_t particleBytes = std::uint64_t{config.maxParticles} * sizeof(format::Particle);
   static_assert(sizeof(gpu::MetavoxelParams) <= kMarchStride);
-  uploadStride_ = (kMarchStride * (2 + volumes_) + particleBytes + 255) / 256 * 256;
+  uploadStride_ = (kMarchStride * (2 + layers_) + particleBytes + 255) / 256 * 256;
   const std::uint64_t slotBytes = texelBytes(config) * config.edge * config.edge * config.edge;
   // What the device asks for is known only once objects are made, so the pool shrinks until all of it fits.
   std::uint64_t slots = config.maxMetavoxels + 63;

@@ -12,7 +12,7 @@ namespace billow::runtime {
 // One draw's part of the memory that the host writes.
 struct MetavoxelUpload {
   std::uint64_t view;       // offset of MarchParams
-  std::uint64_t volumes;    // of one MarchParams a volume, kMarchStride apart
+  std::uint64_t layers;     // of one MarchParams a layer, kMarchStride apart
   std::uint64_t space;      // of MetavoxelParams
   std::uint64_t particles;  // of the host's Particles, and behind them the effects' jobs
 };
@@ -58,8 +58,8 @@ class MetavoxelResources {
   Device& device_;
   MetavoxelSizes sizes_{};
   std::uint64_t uploadStride_ = 0;
-  std::uint32_t volumes_ = 0;
-  bool hasRadii_ = false;  // tracks have
+  std::uint32_t layers_ = 0;  // of a draw, at most
+  bool hasRadii_ = false;     // tracks have
   Buffer tables_;  // materials, curves, ramps, emitters, tracks, given particles, meshes, maps' texels, until they are
                    // copied
 };

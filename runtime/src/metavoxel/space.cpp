@@ -87,6 +87,18 @@ std::optional<CellRange> cellsOf(const Space& space, const Vec3d& low, const Vec
   return range;
 }
 
+// From ways in the volume's own world to voxels of the space.
+std::array<Vec3d, 3> ownToSpace(const Space& space, const MetavoxelVolume& volume) {
+  std::array<Vec3d, 3> rows;
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Vec3d column{volume.objectToWorld[i], volume.objectToWorld[4 + i], volume.objectToWorld[8 + i]};
+      rows[row][i] = dot(space.axes[row], column) / space.voxel;
+    }
+  }
+  return rows;
+}
+
 DrawInfo drawInfoOf(const MetavoxelDraw& draw, Look look) {
   look.anisotropy = draw.scattering.anisotropy;
   look.ambient = draw.scattering.ambient;
@@ -189,20 +201,31 @@ Space spaceOf(const MetavoxelDraw& draw, const MetavoxelSizes& sizes) {
   return space;
 }
 
-std::optional<PlacedVolume> placeVolume(const Space& space, const MetavoxelDraw& draw, const MetavoxelVolume& volume) {
-  const auto& frame = static_cast<const ResidentFrame&>(*volume.frame);
-  PlacedVolume placed{.params = viewParams(drawInfoOf(draw, volume.look)), .cells = std::nullopt};
+std::optional<PlacedLayer> placeLayer(const Space& space, const MetavoxelDraw& draw, const MetavoxelVolume& volume,
+                                      const Layer& layer) {
+  const ResidentFrame& frame = frameOf(layer);
+  Look look = volume.look;
+  look.extinctionScale *= layer.weight;
+  look.emissionScale *= layer.weight;
+  PlacedLayer placed{.params = viewParams(drawInfoOf(draw, look)), .cells = std::nullopt};
   placed.params.bricks = addresses(0, frame.bricks_);
   placed.params.bricks.x = frame.shape_.xBits | frame.shape_.yBits << 8;
+  const Flow flow = flowOf(layer, ownToSpace(space, volume), double{volume.velocityScale}, double{kFarthestCarried});
+  std::copy(flow.rows.begin(), flow.rows.end(), placed.params.flow);
   constexpr double kFar = 1e300;
   Vec3d low{kFar, kFar, kFar}, high{-kFar, -kFar, -kFar};
+  const FrameIndices read = indicesOf(layer);
   for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
-    if (!frame.grids_[slot].present) continue;
+    if (!read[slot]) continue;
     ResidentGrid grid = frame.grids_[slot];
     format::compose(volume.objectToWorld, frame.grids_[slot].frame.indexToWorld, grid.frame.indexToWorld);
     if (!format::invertible(grid.frame.indexToWorld)) return std::nullopt;
     placed.params.grids[slot] = gridParams(grid, space.center, Filter::trilinear);
-    addReach(space, grid.frame, low, high);
+    if (slot < gpu::kMatterSlots) addReach(space, grid.frame, low, high);
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    low[i] -= double{flow.rows[i].w};
+    high[i] += double{flow.rows[i].w};
   }
   placed.cells = cellsOf(space, low, high);
   return placed;

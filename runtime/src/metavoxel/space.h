@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "frame.h"
+#include "layers.h"
 #include "sizes.h"
 
 namespace billow::runtime {
@@ -25,12 +25,13 @@ struct CellRange {  // of cells, at least one along each axis
   std::array<std::uint32_t, 3> first, count;
 };
 
-// A volume's frame where the draw puts it. Fails with the reason where its transform cannot be turned round.
-struct PlacedVolume {
+// A layer of a volume where the draw puts it. None where the volume's transform cannot be turned round.
+struct PlacedLayer {
   gpu::MarchParams params;
   std::optional<CellRange> cells;  // those that its grids may reach; none: it is outside of the space
 };
-std::optional<PlacedVolume> placeVolume(const Space& space, const MetavoxelDraw& draw, const MetavoxelVolume& volume);
+std::optional<PlacedLayer> placeLayer(const Space& space, const MetavoxelDraw& draw, const MetavoxelVolume& volume,
+                                      const Layer& layer);
 
 // Voxels around what the eye sees in which matter counts for its light.
 inline constexpr double kUnseenLight = 64;

@@ -179,12 +179,7 @@ void sumScratch(LoadPlan& plan, std::size_t pageCount) {
 }  // namespace
 
 std::array<std::uint32_t, gpu::kGridSlots> gridsBySlot(const GridChoice& choice) {
-  std::array<std::uint32_t, gpu::kGridSlots> numbers;
-  numbers.fill(format::kNone);
-  numbers[gpu::kExtinctionSlot] = choice.extinction;
-  numbers[gpu::kTemperatureSlot] = choice.temperature;
-  numbers[gpu::kFlamesSlot] = choice.flames;
-  return numbers;
+  return {choice.extinction, choice.temperature, choice.flames, choice.velocityX, choice.velocityY, choice.velocityZ};
 }
 
 bool isPresent(const format::GridFrame& frame) {

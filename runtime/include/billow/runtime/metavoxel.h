@@ -30,7 +30,7 @@ struct MetavoxelConfig {
   // many as if all lived for the emitter's greatest lifetime, and up to two more a span). More are an error.
   std::uint32_t maxParticles = 16384;
   std::uint32_t maxListEntries = 1u << 20;  // particles in metavoxels' lists, all together; further ones are left out
-  std::uint32_t maxVolumes = 4;             // of a draw, 0 to 8
+  std::uint32_t maxVolumes = 4;             // of a draw, each with up to kMostLayers layers, 0 to 8
   // Voxels along each axis of the space's light field, which Scattering::surroundings needs: `metavoxels` to 160, or 0,
   // none. They span 8 of the space's voxels or fewer where there is room for so many, else more. Each takes 22 bytes,
   // and 16 more for each of its voxels that an occupied metavoxel may have.
@@ -43,12 +43,18 @@ struct MetavoxelConfig {
 };
 
 struct MetavoxelVolume {
-  const Frame* frame = nullptr;  // of the Renderer
+  const Frame* frame = nullptr;        // of the Renderer; null where there are layers
+  std::span<const Layer> layers = {};  // in place of the frame: at most kMostLayers
+  // World units a second that a velocity grid's 1 stands for, finite. What carries matter further than
+  // kFarthestCarried voxels of the space along one of its axes carries it as far as that.
+  float velocityScale = 1;
   // Row-major 3x4, from the volume's own world to the scene's; invertible. Extinction and emission stay per unit of the
   // scene's world.
   std::array<double, 12> objectToWorld{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
   Look look = {};  // its anisotropy, ambient and scatteringOrders are not used: see Scattering
 };
+
+inline constexpr float kFarthestCarried = 128;
 
 // An effect of the tables, evaluated on the GPU: what format::particlesAt() gives, in single precision.
 struct MetavoxelEffect {

@@ -85,15 +85,21 @@ enum class Index : std::uint32_t { flat = 0, tree = 1, dense = 2, automatic = 3 
 enum class Filter : std::uint32_t { nearest = 0, trilinear = 1, none = 2 };  // none: shadows only
 enum class ColorFormat { half, single };                                     // RGBA16F, RGBA32F
 
-// The three grids that a picture needs. kNone where the volume has none.
+// The three grids that a picture needs, and those that Layer::advect needs. kNone where the volume has none.
 struct GridChoice {
   std::uint32_t extinction = format::kNone;  // numbers within the volume
   std::uint32_t temperature = format::kNone;
   std::uint32_t flames = format::kNone;
+  std::uint32_t velocityX = format::kNone;  // of what the matter is carried along, in the volume's own world
+  std::uint32_t velocityY = format::kNone;
+  std::uint32_t velocityZ = format::kNone;
 };
 
-// By role; where no grid has a role, the first grid is extinction.
+// By role; where no grid has a role, the first grid is extinction. No velocity: it costs as much memory as the rest.
 GridChoice chooseGrids(const format::Pack& pack, const format::VolumeRecord& volume);
+
+// The choice with what velocity grids the volume has, by role.
+GridChoice withVelocity(const format::Pack& pack, const format::VolumeRecord& volume, GridChoice choice);
 
 struct UploadOptions {
   std::optional<GridChoice> grids = {};  // default: chooseGrids()
@@ -120,15 +126,23 @@ class Frame {
   // uploadSemaphore() reaches this value when the upload is complete. 0 of a Streamer's frames, which are complete:
   // wait for what Streamer::wait() says.
   virtual std::uint64_t uploadValue() const = 0;
-  // Whether any grid has an active voxel.
+  // Whether there is nothing to draw: no grid, those of velocity aside, has an active voxel.
   virtual bool empty() const = 0;
 };
 
-// What is drawn of a volume at one moment: frames whose weights sum to 1.
+inline constexpr std::uint32_t kMostLayers = 4;  // of a volume in one draw: two frames, each of two levels
+
+// A volume between two of its frames, or between two levels of detail, is drawn as several layers: their extinctions
+// and emissions add, each times its weight, so that layers whose weights sum to 1 are a cross-fade. To show moment t
+// between frames at t0 and t1: one of weight 1 - s carried by t - t0 and one of weight s carried by t - t1, where
+// s = (t - t0) / (t1 - t0).
 struct Layer {
   const Frame* frame = nullptr;
-  float weight = 1;  // of its extinction and emission, in [0, 1]
-  float advect = 0;  // seconds that it is carried along its velocity grids, forward or back in time; 0: as it is
+  float weight = 1;  // of its extinction and emission, in [0, 1]; 0: it is not there
+  // Seconds that the frame is carried along its velocity grids (a step back from each place, with the velocity of the
+  // way's middle): positive forward in time, negative back; finite. 0, or where the frame has no velocity grid: as it
+  // is. Where a velocity grid has no voxel, its background says how fast.
+  float advect = 0;
 };
 
 // A pinhole camera in world space, all finite. `right`, `up` and `forward` are orthonormal.
@@ -203,7 +217,7 @@ struct DrawInfo {
 // Reads of single values, as the march makes them: a tool for tests.
 struct LookupInfo {
   const Frame* frame = nullptr;
-  std::uint32_t slot = 0;           // 0 extinction, 1 temperature, 2 flames
+  std::uint32_t slot = 0;           // 0 extinction, 1 temperature, 2 flames, 3 4 5 velocity x y z
   Filter filter = Filter::nearest;  // not none
   VkDeviceAddress positions = 0;    // count times three floats, pack index space
   VkDeviceAddress values = 0;       // count floats are written

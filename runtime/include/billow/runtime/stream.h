@@ -145,8 +145,6 @@ struct UpdateInfo {
   std::uint32_t pixelsHigh = 1080;
 };
 
-inline constexpr std::uint32_t kMostLayers = 4;  // two frames, each of two levels
-
 // What is drawn of an instance until the next update().
 struct Drawable {
   std::array<Layer, kMostLayers> layers = {};  // the first `count`; weights sum to 1
