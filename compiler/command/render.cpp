@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -99,10 +101,11 @@ struct Job {
   bool png;
 };
 
-// How a frame of the volume looks and where it is, in a draw with such a look.
-runtime::MetavoxelVolume place(const Job& job, const PlacedVolume& volume, const runtime::Frame* frame,
+// How layers of the volume look and where they are, in a draw with such a look.
+runtime::MetavoxelVolume place(const Job& job, const PlacedVolume& volume, std::span<const runtime::Layer> layers,
                                const runtime::Look& shared) {
-  runtime::MetavoxelVolume placed{.frame = frame, .objectToWorld = volume.request->transform};
+  runtime::MetavoxelVolume placed{
+      .layers = layers, .velocityScale = job.request.velocityScale, .objectToWorld = volume.request->transform};
   placed.look = lookOf(job.request, *volume.request, volume.suggested, volume.scale());
   placed.look.ambient = shared.ambient;
   placed.look.anisotropy = shared.anisotropy;
@@ -137,11 +140,15 @@ class Painter {
 
   Checked<headless::Picture> render(const Job& job, runtime::DrawInfo draw, const Moment& moment) {
     Shown shown;
+    shown.layers.resize(frames_.size());
     for (std::size_t i = 0; i < frames_.size(); ++i) {
       const PlacedVolume& volume = job.contents.volumes()[i];
-      const auto frame = frameOf(volume, frames_[i], moment.frame ? moment.frame : volume.frameAt(moment.time));
-      if (!frame) return tl::unexpected(frame.error());
-      if (*frame != nullptr) shown.volumes.push_back(place(job, volume, *frame, draw.look));
+      const auto shares = moment.frame ? std::vector<FrameShare>{{*moment.frame}}
+                                       : volume.framesAt(moment.time, job.request.interpolate);
+      auto layers = layersOf(volume, frames_[i], shares);
+      if (!layers) return tl::unexpected(layers.error());
+      shown.layers[i] = std::move(*layers);
+      if (!shares.empty()) shown.volumes.push_back(place(job, volume, shown.layers[i], draw.look));
     }
     shown.effects = job.contents.effectsAt(moment.time);
     if (!metavoxels_) {
@@ -149,7 +156,7 @@ class Painter {
         return refuse(kInvalid, fmt::format("{}: no frame shows {} s after the begin; \"direct\" draws one",
                                             job.request.volumes[0].place, moment.time));
       }
-      draw.frame = shown.volumes[0].frame;
+      draw.frame = shown.layers[0][0].frame;
       draw.look = shown.volumes[0].look;
     }
     auto picture = metavoxels_ ? metavoxels_->render(*gpu_, *renderer_, draw, shown) : gpu_->render(*renderer_, draw);
@@ -159,27 +166,32 @@ class Painter {
   }
 
  private:
-  struct ResidentFrame {
-    std::uint32_t number = 0;
-    std::unique_ptr<runtime::Frame> frame;
-  };
+  using ResidentFrames = std::map<std::uint32_t, std::unique_ptr<runtime::Frame>>;  // by index
 
-  // The volume's frame, uploaded; null where none shows.
-  Checked<const runtime::Frame*> frameOf(const PlacedVolume& volume, ResidentFrame& resident,
-                                         std::optional<std::uint32_t> number) {
-    if (!number || (resident.frame && resident.number == *number)) return number ? resident.frame.get() : nullptr;
-    resident.frame.reset();  // so that there is room for the next
-    auto frame = renderer_->upload(*volume.pack, volume.number, *number, {.grids = volume.grids});
-    if (!frame) return tl::unexpected(toRefusal(frame.error(), volume.request->pack));
-    resident = {*number, std::move(*frame)};
-    return resident.frame.get();
+  // The volume's frames, uploaded; of others nothing is kept, so that there is room.
+  Checked<std::vector<runtime::Layer>> layersOf(const PlacedVolume& volume, ResidentFrames& resident,
+                                                std::span<const FrameShare> shares) {
+    std::erase_if(resident, [&](const auto& entry) {
+      return std::none_of(shares.begin(), shares.end(), [&](const FrameShare& s) { return s.frame == entry.first; });
+    });
+    std::vector<runtime::Layer> layers;
+    for (const FrameShare& share : shares) {
+      std::unique_ptr<runtime::Frame>& place = resident[share.frame];
+      if (!place) {
+        auto frame = renderer_->upload(*volume.pack, volume.number, share.frame, {.grids = volume.grids});
+        if (!frame) return tl::unexpected(toRefusal(frame.error(), volume.request->pack));
+        place = std::move(*frame);
+      }
+      layers.push_back({place.get(), share.weight, share.advect});
+    }
+    return layers;
   }
 
   // In the order in which they are made; destroyed the other way round.
   std::unique_ptr<headless::Headless> gpu_;
   std::unique_ptr<runtime::Renderer> renderer_;
   std::optional<MetavoxelPainter> metavoxels_;
-  std::vector<ResidentFrame> frames_;  // by volume
+  std::vector<ResidentFrames> frames_;  // by volume
 };
 
 // The axis of the scene along which the gas of the first volume rises, or the particles.
@@ -276,6 +288,7 @@ void addRender(CLI::App& app, Run& run) {
       "Examples:\n"
       "  billow render fire.blw --frame 12 -o fire.png\n"
       "  billow render fire.blw --frame 5-12 -o fire.exr      writes fire_0005.exr to fire_0012.exr\n"
+      "  billow render smoke.blw --time 0.35 --interpolate advect -o smoke.png   between two frames\n"
       "  billow render smoke.blw --effect 'campfire smoke' --time 2 -o smoke.png\n"
       "  billow render fireplace.scene.json --frame 0-47 -o fireplace.png   frame N at N / 24 s\n"
       "Exit codes: 0 done, 1 command line, 2 a file cannot be read or written, 3 invalid pack or scene, 4 no usable "

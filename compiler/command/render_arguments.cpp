@@ -85,6 +85,7 @@ void applyNumbers(const RenderArguments& arguments, RenderRequest& request) {
   request.camera.fieldOfView = arguments.fieldOfView.value_or(request.camera.fieldOfView);
   request.output = arguments.output;
   request.step = given.step;
+  request.velocityScale = given.velocityScale;
   request.gpuBudget = given.gpuBudget;
   request.device = given.device;
   request.shadows = arguments.shadows == "none"      ? runtime::Filter::none
@@ -192,9 +193,20 @@ void addMethodOptions(CLI::App& command, RenderArguments& arguments) {
                   "scenes that list what they hold (default: direct where it can)")
       ->check(CLI::IsMember({"direct", "metavoxel"}));
   command.add_option("--effect", arguments.effects, "An effect of the pack, beside the volume or alone");
-  command.add_option("--time", arguments.direct.time, "Without --frame: seconds after the begin of effects or scene")
+  command
+      .add_option("--time", arguments.direct.time,
+                  "Without --frame: seconds after the begin of the volume, the scene, or (drawn alone) the effects")
       ->check(finite())
       ->check(CLI::Range(0.0, format::kMaxEffectTime));
+  command
+      .add_option("--interpolate", arguments.interpolate,
+                  "What volumes show between frames: hold (default) the frame before, blend it with the next, or\n"
+                  "advect: carry both along their velocity to the moment, and blend these; needs --method metavoxel")
+      ->check(CLI::IsMember({"hold", "blend", "advect"}));
+  command
+      .add_option("--velocity-scale", arguments.direct.velocityScale,
+                  "World units a second that a velocity grid's 1 stands for (default 1; what tools write differs)")
+      ->check(finite());
   command
       .add_option("--surroundings", arguments.direct.surroundings,
                   "Of metavoxels: how much of the light that matter gives off and scatters reaches other matter,\n"
@@ -243,18 +255,21 @@ Checked<void> applyTime(const RenderArguments& arguments, RenderRequest& request
     if (frames != request.time.has_value()) return {};
     return refuse(kCommandLine, "--frame or --time of a scene: expected one of the two");
   }
-  if (!frames && request.effects.empty()) {
-    return refuse(kCommandLine, "--frame of a volume, or --effect, must be given");
+  if (!frames && !request.time && request.effects.empty()) {
+    return refuse(kCommandLine, "--frame or --time of a volume, or --effect, must be given");
   }
   if (frames == request.time.has_value()) {
-    return refuse(kCommandLine, "--time says when effects are drawn without --frame: expected one of the two");
+    return refuse(kCommandLine, "--time says what is drawn without --frame: expected one of the two");
   }
-  if (!frames) request.volumes.clear();
+  if (!frames && !request.effects.empty()) request.volumes.clear();
   return {};
 }
 
 Checked<void> applyMethod(const RenderArguments& arguments, RenderRequest& request) {
-  const bool needed = request.scene || !request.effects.empty();
+  using enum runtime::Interpolation;
+  const std::string interpolate = arguments.interpolate.value_or("hold");
+  request.interpolate = interpolate == "advect" ? advect : interpolate == "blend" ? blend : hold;
+  const bool needed = request.scene || !request.effects.empty() || request.interpolate != hold;
   request.method = arguments.method ? (*arguments.method == "direct" ? Method::direct : Method::metavoxel)
                    : needed         ? Method::metavoxel
                                     : Method::direct;
@@ -263,6 +278,10 @@ Checked<void> applyMethod(const RenderArguments& arguments, RenderRequest& reque
   // More of them imitate what is now found.
   if (request.surroundings > 0 && !request.look.scatteringOrders) request.look.scatteringOrders = 1;
   if (request.method == Method::metavoxel) return {};
+  if (request.interpolate != hold) {
+    return refuse(kCommandLine,
+                  fmt::format("--interpolate {} is drawn by --method metavoxel alone, not by \"direct\"", interpolate));
+  }
   if (request.surroundings > 0) {
     return refuse(kCommandLine, "--surroundings is drawn by --method metavoxel alone, not by \"direct\"");
   }

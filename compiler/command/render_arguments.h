@@ -14,8 +14,8 @@ namespace billow::command {
 // Options as texts, before they are checked; those that are given override the scene's.
 struct RenderArguments {
   std::string input, output;
-  std::optional<std::string> frames, method, size, camera, sunDirection, sunColor, background, up, filter, albedo,
-      ambient;
+  std::optional<std::string> frames, method, interpolate, size, camera, sunDirection, sunColor, background, up, filter,
+      albedo, ambient;
   std::string shadows = "nearest";
   std::optional<std::string> volume;
   GridNames grids;

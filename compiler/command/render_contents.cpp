@@ -79,22 +79,28 @@ double PlacedVolume::scale() const {
   return std::cbrt(std::abs(format::determinant(matrix)));
 }
 
-std::optional<std::uint32_t> PlacedVolume::frameAt(double seconds) const {
-  if (still) return still;
+std::vector<FrameShare> PlacedVolume::framesAt(double seconds, runtime::Interpolation interpolation) const {
+  if (still) return {{*still}};
   const auto frames = pack->framesOf(record());
-  if (frames.empty()) return std::nullopt;
+  if (frames.empty()) return {};
   const auto rate = static_cast<double>(record().framesPerSecond);
   const double frameTime = 1 / rate;
   double time = (seconds - request->begin) * (request->framesPerSecond.value_or(rate) / rate);
   time += 1e-6 * frameTime;  // what rounding takes away must not cost a frame
   const double length = frames.back().time + frameTime;
-  if (!(time >= 0)) return std::nullopt;
-  if (time >= length && request->after == AfterLast::vanish) return std::nullopt;
+  if (!(time >= 0)) return {};
+  if (time >= length && request->after == AfterLast::vanish) return {};
   if (request->after == AfterLast::loop) time = std::fmod(time, length);
   const auto next = std::upper_bound(frames.begin(), frames.end(), time,
                                      [](double t, const format::FrameRecord& frame) { return t < frame.time; });
-  if (next == frames.begin()) return std::nullopt;
-  return static_cast<std::uint32_t>(next - frames.begin() - 1);
+  if (next == frames.begin()) return {};
+  const auto before = static_cast<std::uint32_t>(next - frames.begin() - 1);
+  if (interpolation == runtime::Interpolation::hold || next == frames.end()) return {{before}};
+  const double since = time - frames[before].time, until = next->time - time;
+  const auto share = static_cast<float>(since / (since + until));
+  const bool carried = interpolation == runtime::Interpolation::advect;
+  return {{before, 1 - share, carried ? static_cast<float>(since) : 0},
+          {before + 1, share, carried ? static_cast<float>(-until) : 0}};
 }
 
 runtime::WorldBox PlacedVolume::box() const {
@@ -105,7 +111,7 @@ runtime::WorldBox PlacedVolume::box() const {
 Checked<Contents> Contents::find(const RenderRequest& request) {
   Contents contents;
   for (const VolumeRequest& volume : request.volumes) {
-    if (auto added = contents.addVolume(volume); !added) return tl::unexpected(added.error());
+    if (auto added = contents.addVolume(volume, request.interpolate); !added) return tl::unexpected(added.error());
   }
   for (const EffectRequest& effect : request.effects) {
     if (auto added = contents.addEffect(effect); !added) return tl::unexpected(added.error());
@@ -132,7 +138,7 @@ Checked<const format::Pack*> Contents::open(const std::string& file, const std::
   return known.get();
 }
 
-Checked<void> Contents::addVolume(const VolumeRequest& request) {
+Checked<void> Contents::addVolume(const VolumeRequest& request, runtime::Interpolation interpolation) {
   const auto pack = open(request.pack, request.place);
   if (!pack) return tl::unexpected(pack.error());
   const auto number = findVolume(**pack, request.volume.value_or(""));
@@ -141,6 +147,9 @@ Checked<void> Contents::addVolume(const VolumeRequest& request) {
   const auto grids = findGrids(**pack, volume.record(), request);
   if (!grids) return tl::unexpected(grids.error());
   volume.grids = *grids;
+  if (interpolation == runtime::Interpolation::advect) {
+    volume.grids = runtime::withVelocity(**pack, volume.record(), volume.grids);
+  }
   if (request.frame) {
     const std::ptrdiff_t frame = findFrame(**pack, volume.record(), *request.frame);
     if (frame < 0)

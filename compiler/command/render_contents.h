@@ -21,6 +21,13 @@ namespace billow::command {
 using Particles = std::vector<format::Particle>;
 using Effects = std::vector<runtime::MetavoxelEffect>;
 
+// What a volume shows of one of its frames.
+struct FrameShare {
+  std::uint32_t frame;  // an index
+  float weight = 1;
+  float advect = 0;  // seconds
+};
+
 struct PlacedVolume {
   const VolumeRequest* request;
   const format::Pack* pack;
@@ -32,8 +39,8 @@ struct PlacedVolume {
   const format::VolumeRecord& record() const { return pack->volumes()[number]; }
   // How much longer its lengths are in the scene.
   double scale() const;
-  // The index of the frame that shows at a time of the scene, where one does.
-  std::optional<std::uint32_t> frameAt(double seconds) const;
+  // The frames that show at a time of the scene: none, one or two.
+  std::vector<FrameShare> framesAt(double seconds, runtime::Interpolation interpolation) const;
   // Of all frames that may show.
   runtime::WorldBox box() const;
 };
@@ -72,7 +79,7 @@ class Contents {
 
  private:
   Checked<const format::Pack*> open(const std::string& file, const std::string& place);
-  Checked<void> addVolume(const VolumeRequest& request);
+  Checked<void> addVolume(const VolumeRequest& request, runtime::Interpolation interpolation);
   Checked<void> addEffect(const EffectRequest& request);
 
   std::map<std::string, std::unique_ptr<format::Pack>> packs_;

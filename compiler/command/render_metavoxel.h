@@ -19,6 +19,7 @@ void addParticles(const Particles& particles, runtime::WorldBox& box);
 // What there is to draw at one moment.
 struct Shown {
   std::vector<runtime::MetavoxelVolume> volumes;
+  std::vector<std::vector<runtime::Layer>> layers;  // of the volumes
   Effects effects;
 };
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "billow/runtime/runtime.h"
+#include "billow/runtime/stream.h"
 
 namespace billow::command {
 
@@ -81,9 +82,11 @@ struct RenderRequest {
   bool scene = false;
   double framesPerSecond = 24;
   Method method = Method::direct;
-  std::optional<double> time;       // where no frame is asked for, seconds
-  std::optional<double> voxelSize;  // of metavoxels, world units
-  float surroundings = 0;           // of metavoxels, as runtime::Scattering has them
+  std::optional<double> time;                                         // where no frame is asked for, seconds
+  runtime::Interpolation interpolate = runtime::Interpolation::hold;  // of volumes between frames
+  float velocityScale = 1;                                            // world units a second of a velocity grid's 1
+  std::optional<double> voxelSize;                                    // of metavoxels, world units
+  float surroundings = 0;                                             // of metavoxels, as runtime::Scattering has them
   std::uint32_t bounces = 2;
   std::int32_t firstFrame = 0, lastFrame = 0;
   bool range = false;
