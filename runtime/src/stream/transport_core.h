@@ -108,6 +108,7 @@ class TransportCore final : public Transport {
   void countWanted();
   // Ends a load that this thread has: it arrives with the frame, or with an error, or goes where it was cancelled.
   void finish(Load& load, std::optional<Error> error);
+  void land(Load& load);
   void submitBatches();
   void progress();
   void fail(const Error& error);

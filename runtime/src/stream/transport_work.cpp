@@ -266,6 +266,7 @@ void TransportCore::copied(Load& load) {
   {
     const std::lock_guard lock(mutex_);
     load.step = Step::flying;
+    if (failure_) land(load);  // meanwhile
     refused = std::exchange(refused_, false);
   }
   if (refused) wake();
@@ -326,6 +327,13 @@ void TransportCore::submitBatches() {
   if (auto done = uploader_.submit(); !done) fail(done.error());
 }
 
+// Ends a load that was flying, with mutex_ held.
+void TransportCore::land(Load& load) {
+  share_.giveBack(std::exchange(load.promised, 0));
+  load.error = failure_;
+  load.step = load.cancelled ? Step::dying : Step::arrived;
+}
+
 // Takes in what the device has executed.
 void TransportCore::progress() {
   if (broken_) return;
@@ -339,8 +347,7 @@ void TransportCore::progress() {
       if (load.step != Step::flying || load.upload.batch > *done) continue;
       any = true;
       dead = dead || load.cancelled;
-      share_.giveBack(std::exchange(load.promised, 0));
-      load.step = load.cancelled ? Step::dying : Step::arrived;
+      land(load);
     }
   }
   if (ringBlocked_ && uploader_.seen() != *done) askPump();
@@ -355,10 +362,7 @@ void TransportCore::fail(const Error& error) {
     failure_ = error;
     broken_ = true;
     for (auto& [number, load] : loads_) {
-      if (load.step != Step::flying) continue;
-      load.error = error;
-      share_.giveBack(std::exchange(load.promised, 0));
-      load.step = load.cancelled ? Step::dying : Step::arrived;
+      if (load.step == Step::flying) land(load);
     }
   }
   askPump();
