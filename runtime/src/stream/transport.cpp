@@ -70,6 +70,7 @@ TransportCore::Plan TransportCore::plan(const LoadOrder& order) const {
                   .volume = order.volume,
                   .frame = order.frame,
                   .grids = order.grids,
+                  .means = order.means,
                   .bc7 = device_.bc7,
                   .maxImageExtent3D = device_.maxImageExtent3D,
                   .verify = config_.verify,
