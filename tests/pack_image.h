@@ -85,6 +85,8 @@ struct PackImage {
   std::vector<std::uint32_t> pageLists;
   std::vector<format::PageRecord> pageRecords;  // as they will be stored, but for offset, checksum, sizes and codec
   std::vector<std::vector<std::byte>> pages;    // raw
+  std::vector<format::LevelRecord> levels;
+  std::vector<format::LevelError> levelErrors;
   std::string strings;
   std::string info;
 
@@ -99,11 +101,16 @@ struct PackImage {
     copy(image.gridFrames, pack.gridFrames());
     copy(image.pageLists, pack.pageLists());
     copy(image.pageRecords, pack.pages());
-    for (const format::SectionEntry& section : pack.sections()) {
-      if (section.type != format::kSectionStrings) continue;
-      image.strings.resize(section.size);
-      pack.source().read(section.offset, std::as_writable_bytes(std::span(image.strings)));
-    }
+    copy(image.levels, pack.levels());
+    const auto read = [&](std::uint32_t type, auto& into) {
+      for (const format::SectionEntry& section : pack.sections()) {
+        if (section.type != type) continue;
+        into.resize(section.size / sizeof(into[0]));
+        pack.source().read(section.offset, std::as_writable_bytes(std::span(into)));
+      }
+    };
+    read(format::kSectionStrings, image.strings);
+    read(format::kSectionLevelErrors, image.levelErrors);
     image.info = *pack.infoJson();
     for (std::uint32_t i = 0; i < image.pageRecords.size(); ++i) image.pages.push_back(pack.readPage(i)->raw);
     return image;
@@ -156,6 +163,8 @@ struct PackImage {
                                      {format::kSectionPageLists, 1, bytesOf(pageLists)},
                                      {format::kSectionPageTable, 1, bytesOf(records)}};
     if (!info.empty()) sections.push_back({format::kSectionInfo, 0, bytesOf(info)});
+    if (!levels.empty()) sections.push_back({format::kSectionLevels, 0, bytesOf(levels)});
+    if (!levelErrors.empty()) sections.push_back({format::kSectionLevelErrors, 0, bytesOf(levelErrors)});
     std::vector<std::byte> out(sizeof(format::FileHeader) + sections.size() * sizeof(format::SectionEntry));
     for (std::size_t i = 0; i < sections.size(); ++i) {
       const Section& section = sections[i];

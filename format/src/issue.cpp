@@ -99,6 +99,16 @@ constexpr IssueKind kCatalogue[] = {
     error(Rule::pageOffset, "page-offset", "The pages follow one another without gaps and fill their section."),
     error(Rule::streamLength, "stream-length",
           "A global array has at most 2^27 units, 2^31 masks, or 2^32 - 1 other items."),
+    error(
+        Rule::levelVolumes, "level-volumes",
+        "Levels are in order of their full volumes, each 2^1 to 2^4 times as coarse and more so than the one before; a "
+        "volume is the level of one other that is none itself."),
+    error(Rule::levelContents, "level-contents",
+          "A level has its full volume's look, frame rate, frames and grids, and each grid in the same frames."),
+    error(Rule::levelPlace, "level-place",
+          "A level's voxels are as much longer as it is coarser, and each lies where those are that it covers."),
+    error(Rule::levelErrors, "level-errors",
+          "The levels divide their errors in order and without remainder, which are finite and not negative."),
 
     error(Rule::pageChecksum, "page-checksum", "A page's checksum matches its stored bytes."),
     error(Rule::pageDecompress, "page-decompress", "A page decompresses to exactly the bytes that were written."),

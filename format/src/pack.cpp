@@ -85,18 +85,24 @@ bool PackReader::read(std::unique_ptr<ByteSource> source, Pack& pack, FileHeader
   readTable(bytes, pack.sections_, kSectionGridFrames, pack.gridFrames_, sink);
   readTable(bytes, pack.sections_, kSectionPageLists, pack.pageLists_, sink);
   readTable(bytes, pack.sections_, kSectionPageTable, pack.pages_, sink);
+  readTable(bytes, pack.sections_, kSectionLevels, pack.levels_, sink);
+  readTable(bytes, pack.sections_, kSectionLevelErrors, pack.levelErrors_, sink);
   readEffects(bytes, pack.sections_, pack.effects_, sink);
   if (sink.stopped()) return false;
   checkTables(view(pack), sink);
   checkPageTable(view(pack), sink);
+  if (sink.errors() == before) checkLevels(view(pack), sink);
   checkEffects(view(pack), sink);
   if (checkTracks(view(pack), sink)) loadTracks(view(pack), pack.effects_, sink);
-  return sink.errors() == before;
+  if (sink.errors() != before) return false;
+  pack.isLevel_.resize(pack.volumes_.size());
+  for (const LevelRecord& level : pack.levels_) pack.isLevel_[level.level] = true;
+  return true;
 }
 
 TableView PackReader::view(const Pack& pack) {
-  return {pack.sections_,   pack.strings_,   pack.volumes_, pack.grids_,   pack.frames_,
-          pack.gridFrames_, pack.pageLists_, pack.pages_,   &pack.effects_};
+  return {pack.sections_,  pack.strings_, pack.volumes_, pack.grids_,       pack.frames_,  pack.gridFrames_,
+          pack.pageLists_, pack.pages_,   pack.levels_,  pack.levelErrors_, &pack.effects_};
 }
 
 Result<Pack> Pack::open(std::unique_ptr<ByteSource> source) {
@@ -144,6 +150,15 @@ std::span<const FrameRecord> Pack::framesOf(const VolumeRecord& volume) const {
 
 const GridFrame& Pack::gridFrame(const VolumeRecord& volume, std::uint32_t frame, std::uint32_t grid) const {
   return gridFrames_[volume.firstGridFrame + std::size_t{frame} * volume.gridCount + grid];
+}
+
+std::span<const LevelRecord> Pack::levelsOf(std::uint32_t volume) const {
+  const auto [begin, end] = std::ranges::equal_range(levels_, volume, {}, &LevelRecord::volume);
+  return {begin, end};
+}
+
+const LevelError& Pack::levelError(const LevelRecord& level, std::uint32_t frame, std::uint32_t grid) const {
+  return levelErrors_[level.firstError + std::size_t{frame} * volumes_[level.level].gridCount + grid];
 }
 
 std::span<const std::uint32_t> Pack::pagesOf(const GridFrame& gridFrame) const {

@@ -31,6 +31,7 @@ constexpr bool isWell(std::size_t stored, std::size_t raw) {
 }
 
 CompressedPage compress(ZSTD_CCtx* context, std::vector<std::byte> raw, const PageRuns& runs, Compression compression) {
+  if (compression == Compression::none) return {std::move(raw), Codec::raw};
   std::vector<std::byte> modelled;
   if (compression == Compression::small) {
     modelled = encodePage(runs, raw);

@@ -30,6 +30,8 @@ constexpr SectionKind kSectionKinds[] = {
     {"PLST", kSectionPageLists, kSectionRequired},
     {"PDIR", kSectionPageTable, kSectionRequired},
     {"INFO", kSectionInfo, 0},
+    {"LEVL", kSectionLevels, 0},
+    {"LERR", kSectionLevelErrors, 0},
     {"EFCT", kSectionEffects, 0},
     {"EMIT", kSectionEmitters, 0},
     {"SPWN", kSectionSpans, 0},

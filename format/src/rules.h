@@ -90,6 +90,8 @@ struct TableView {
   std::span<const GridFrame> gridFrames;
   std::span<const std::uint32_t> pageLists;
   std::span<const PageRecord> pages;
+  std::span<const LevelRecord> levels;
+  std::span<const LevelError> levelErrors;
   const EffectTables* effects;
 
   // Where byte `byte` of a table lies in the file.
@@ -100,6 +102,7 @@ struct TableView {
 // All rules of the tables but those of the page table.
 void checkTables(const TableView& tables, IssueSink& sink);
 void checkPageTable(const TableView& tables, IssueSink& sink);  // page_table_rules.cpp
+void checkLevels(const TableView& tables, IssueSink& sink);     // level_rules.cpp
 void checkEffects(const TableView& tables, IssueSink& sink);    // effect_rules.cpp
 bool checkTracks(const TableView& tables, IssueSink& sink);     // track_rules.cpp; false: frames cannot be found
 // Decodes the frames, after checkTracks(). `effects` are those of the view.

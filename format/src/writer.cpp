@@ -16,6 +16,7 @@ namespace billow::format {
 namespace {
 
 constexpr std::uint32_t kMostSections = 9;
+constexpr std::uint32_t kLevelSections = 2;
 constexpr std::uint32_t kEffectSections = 12;
 
 constexpr std::uint64_t aligned(std::uint64_t offset) {
@@ -23,8 +24,9 @@ constexpr std::uint64_t aligned(std::uint64_t offset) {
 }
 
 // Pages are written before anybody knows whether there will be an INFO section, so room is kept for its entry.
-constexpr std::uint64_t pagesOffset(bool effects) {
-  return aligned(sizeof(FileHeader) + (kMostSections + (effects ? kEffectSections : 0)) * sizeof(SectionEntry));
+constexpr std::uint64_t pagesOffset(const PackWriter::Options& options) {
+  const std::uint32_t optional = (options.levels ? kLevelSections : 0) + (options.effects ? kEffectSections : 0);
+  return aligned(sizeof(FileHeader) + (kMostSections + optional) * sizeof(SectionEntry));
 }
 
 template <class T>
@@ -47,7 +49,7 @@ struct PackWriter::Impl {
   Impl(std::string path, Options given)
       : options(given),
         file(std::move(path)),
-        pagesBegin(pagesOffset(given.effects)),
+        pagesBegin(pagesOffset(given)),
         compressor(given.compression, given.threads) {
     options.pageBytes = std::clamp<std::uint32_t>(options.pageBytes, 1, kMaxPageBytes);
   }
@@ -56,6 +58,7 @@ struct PackWriter::Impl {
   void closePage();
   void writeOldest();
   void writeSection(std::uint32_t type, std::uint32_t flags, std::span<const std::byte> bytes);
+  void writeLevels(const PackTables& tables);
   void writeEffects(const EffectTables& effects);
   void writeHeader();
 
@@ -129,6 +132,13 @@ void PackWriter::Impl::writeSection(std::uint32_t type, std::uint32_t flags, std
   end = offset + bytes.size();
 }
 
+void PackWriter::Impl::writeLevels(const PackTables& tables) {
+  if (tables.levels.empty()) return;
+  if (!options.levels) throw std::logic_error("PackWriter: no room for levels");
+  writeSection(kSectionLevels, 0, bytesOf(tables.levels));
+  writeSection(kSectionLevelErrors, 0, bytesOf(tables.levelErrors));
+}
+
 void PackWriter::Impl::writeEffects(const EffectTables& effects) {
   const auto write = [&](std::uint32_t type, const auto& records) {
     if (!records.empty()) writeSection(type, 0, bytesOf(records));
@@ -171,6 +181,10 @@ std::uint32_t PackWriter::append(Stream stream, const void* items, std::uint32_t
   return impl_->append(static_cast<std::uint32_t>(stream), items, count);
 }
 
+void PackWriter::endPage() {
+  impl_->closePage();
+}
+
 std::array<std::uint64_t, kStreamCount> PackWriter::itemCounts() const {
   std::array<std::uint64_t, kStreamCount> counts{};
   std::copy(impl_->total.begin(), impl_->total.end(), counts.begin());
@@ -204,6 +218,7 @@ std::uint64_t PackWriter::close(const PackTables& tables) {
   impl.writeSection(kSectionPageLists, kSectionRequired, bytesOf(tables.pageLists));
   impl.writeSection(kSectionPageTable, kSectionRequired, bytesOf(impl.pages));
   if (!tables.infoJson.empty()) impl.writeSection(kSectionInfo, 0, std::as_bytes(std::span(tables.infoJson)));
+  impl.writeLevels(tables);
   if (!tables.effects.empty() && !impl.options.effects) throw std::logic_error("PackWriter: no room for effects");
   impl.writeEffects(tables.effects);
   impl.writeHeader();

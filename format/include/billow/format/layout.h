@@ -140,6 +140,9 @@ inline constexpr std::uint32_t kSectionPageLists = fourcc('P', 'L', 'S', 'T');  
 inline constexpr std::uint32_t kSectionPageTable = fourcc('P', 'D', 'I', 'R');   // PageRecord[]
 inline constexpr std::uint32_t kSectionPages = fourcc('P', 'A', 'G', 'E');       // the pages, one after another
 inline constexpr std::uint32_t kSectionInfo = fourcc('I', 'N', 'F', 'O');        // optional: JSON, provenance
+// Optional: which volumes are coarser levels of others.
+inline constexpr std::uint32_t kSectionLevels = fourcc('L', 'E', 'V', 'L');       // LevelRecord[]
+inline constexpr std::uint32_t kSectionLevelErrors = fourcc('L', 'E', 'R', 'R');  // LevelError[]
 // Optional: effects (effect.h).
 inline constexpr std::uint32_t kSectionEffects = fourcc('E', 'F', 'C', 'T');      // EffectRecord[]
 inline constexpr std::uint32_t kSectionEmitters = fourcc('E', 'M', 'I', 'T');     // EmitterRecord[]
@@ -283,6 +286,27 @@ struct GridFrame {
   std::uint32_t reserved2;
 };
 BILLOW_ASSERT_SIZE(GridFrame, 248);
+
+// ---- Detail levels: a volume that holds another one's frames and grids with voxels 2^log2 as long. Its voxel c covers
+// the full volume's voxels 2^log2 c to 2^log2 (c + 1) - 1 of source index space, and is their mean.
+inline constexpr std::uint32_t kMaxLevelLog2 = 4;
+
+struct LevelRecord {
+  std::uint32_t volume;      // the full one
+  std::uint32_t level;       // the volume that holds the coarser trees
+  std::uint32_t log2;        // 1 to kMaxLevelLog2
+  std::uint32_t firstError;  // that of the level's frame f and grid g is errors[firstError + f * gridCount + g]
+};
+BILLOW_ASSERT_SIZE(LevelRecord, 16);
+
+// What a level, trilinear between its voxels, differs by from the full volume's source at the centres of all voxels,
+// active or not. One a grid frame of a level.
+struct LevelError {
+  double squaredError;  // sum over voxels
+  float maxError;
+  std::uint32_t reserved;
+};
+BILLOW_ASSERT_SIZE(LevelError, 16);
 
 // ---- Pages. A page holds a run of each of six global arrays, one after the other in this order, no gaps:
 enum class Stream : std::uint32_t { unit = 0, mask = 1, node5 = 2, node4 = 3, node3 = 4, child = 5 };

@@ -38,6 +38,9 @@ class Pack {
   std::span<const GridFrame> gridFrames() const { return gridFrames_; }
   std::span<const std::uint32_t> pageLists() const { return pageLists_; }
   std::span<const PageRecord> pages() const { return pages_; }
+  // Detail levels, by full volume, then finest first. A level's volume stands among volumes() like any other; whoever
+  // lists or draws volumes passes over those that isLevel().
+  std::span<const LevelRecord> levels() const { return levels_; }
   const EffectTables& effects() const { return effects_; }  // empty where the pack has none
   std::string_view string(StringRef ref) const;
   std::uint64_t fileSize() const;
@@ -49,6 +52,12 @@ class Pack {
   std::span<const FrameRecord> framesOf(const VolumeRecord& volume) const;
   const GridFrame& gridFrame(const VolumeRecord& volume, std::uint32_t frame, std::uint32_t grid) const;
   std::span<const std::uint32_t> pagesOf(const GridFrame& gridFrame) const;
+
+  // Levels of a full volume, finest first; none where it has none, or is a level itself.
+  std::span<const LevelRecord> levelsOf(std::uint32_t volume) const;
+  // Whether the volume holds a coarser level of another one.
+  bool isLevel(std::uint32_t volume) const { return isLevel_[volume]; }
+  const LevelError& levelError(const LevelRecord& level, std::uint32_t frame, std::uint32_t grid) const;
 
   // The INFO section's JSON text, or "" where there is none.
   Result<std::string> infoJson() const;
@@ -67,6 +76,9 @@ class Pack {
   std::vector<GridFrame> gridFrames_;
   std::vector<std::uint32_t> pageLists_;
   std::vector<PageRecord> pages_;
+  std::vector<LevelRecord> levels_;
+  std::vector<LevelError> levelErrors_;
+  std::vector<bool> isLevel_;  // by volume
   EffectTables effects_;
 };
 

@@ -71,6 +71,10 @@ enum class Rule : std::uint16_t {
   pageStreams = 232,
   pageOffset = 233,
   streamLength = 234,
+  levelVolumes = 240,
+  levelContents = 241,
+  levelPlace = 242,
+  levelErrors = 243,
 
   pageChecksum = 301,
   pageDecompress = 302,

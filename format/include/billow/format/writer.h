@@ -23,14 +23,17 @@ struct PackTables {
   std::vector<std::uint32_t> pageLists;
   std::string strings;
   std::string infoJson;  // "" writes no INFO section
-  EffectTables effects;  // tables without a record write no section
+  // Tables without a record write no section.
+  std::vector<LevelRecord> levels;
+  std::vector<LevelError> levelErrors;
+  EffectTables effects;
 
   StringRef addString(const std::string& text);  // equal strings share
 };
 
-// What pages are compressed for: `small`, the fewest bytes (Codec::model, or zstd where that is smaller still), or
-// `fast`, the quickest reading (Codec::zstd). Pages that don't shrink are stored raw.
-enum class Compression { small, fast };
+// What pages are compressed for: `small`, the fewest bytes (Codec::model, or zstd where that is smaller still), `fast`,
+// reading several times as quick (Codec::zstd), or `none`: reading is a copy. Pages that don't shrink are stored raw.
+enum class Compression { small, fast, none };
 
 // Writes to a temporary name beside `path`, renamed by commit(); the destructor removes what is unfinished.
 // Throws std::system_error (with the path) when the file cannot be written.
@@ -39,7 +42,9 @@ class PackWriter {
   struct Options {
     std::uint32_t pageBytes = 128u << 10;  // raw bytes at which a page is closed
     Compression compression = Compression::small;
-    bool effects = false;  // whether the tables will have effects: room is kept for the entries of their sections
+    // Whether the tables will have levels, and effects: room is kept for the entries of their sections.
+    bool levels = false;
+    bool effects = false;
     unsigned threads = 0;  // that compress pages; 0: as many as the machine has, at most 8. The bytes are the same.
   };
   PackWriter(std::string path, Options options);
@@ -50,6 +55,8 @@ class PackWriter {
   // Appends `count` items and returns the global index of the first. All of one call lies in one page, so a call may
   // bring at most kMaxPageBytes (else std::length_error). A brick's units and a node's child list are one call each.
   std::uint32_t append(Stream stream, const void* items, std::uint32_t count);
+  // What is appended next begins a page, so that it can be read without what was before.
+  void endPage();
   // Items appended so far, by stream.
   std::array<std::uint64_t, kStreamCount> itemCounts() const;
   // The page in which the stream's item lies (or will lie, while its page is open).
