@@ -24,6 +24,7 @@ struct Arguments {
   std::vector<std::string> inputs;
   ImportArguments import;
   std::string report;  // "": none
+  std::uint32_t level = 0;
   bool json = false;
 };
 
@@ -56,7 +57,9 @@ void printTable(const std::vector<GridRow>& rows) {
       fmt::print("{:>6} {:<24} {}\n", row.frame, name, row.problem);
       continue;
     }
-    const auto decibels = [](double db) { return db > 0 && std::isinf(db) ? "exact" : fmt::format("{:.2f}", db); };
+    const auto decibels = [](double db) {
+      return std::isnan(db) ? "-" : db > 0 && std::isinf(db) ? "exact" : fmt::format("{:.2f}", db);
+    };
     fmt::print("{:>6} {:<24} {:>13} {:>9} {:>9} {:>11.4g} {:>11.4g} {:>10}\n", row.frame, name, row.error.sourceVoxels,
                decibels(row.psnr()), decibels(row.depthPsnr()), row.error.rmse(), row.error.maxError,
                row.error.mismatchedVoxels);
@@ -109,7 +112,7 @@ int runCompare(const Arguments& arguments) {
     file.emplace(arguments.report);
     report.emplace(*pack, arguments.pack, arguments.inputs);
   }
-  const auto rows = compareFrames(*pack, plan, options, [&](const ComparedGrid& compared) {
+  const auto rows = compareFrames(*pack, plan, options, arguments.level, [&](const ComparedGrid& compared) {
     if (report) report->observe(compared);
   });
   if (!rows) return reportIssue(arguments.pack, rows.error());
@@ -142,12 +145,21 @@ void addCompare(CLI::App& app, Run& run) {
   command->add_option("PACK", arguments->pack, "The pack to measure")->required()->type_name("PACK");
   command->add_option("INPUT", arguments->inputs, "The source, as for compile")->required()->type_name("INPUT");
   addImportOptions(*command, arguments->import);
+  CLI::Option* level =
+      command
+          ->add_option("--level", arguments->level,
+                       "Measure a coarser level in its volume's place: 1, of voxels twice as long, or 2, of four times")
+          ->check(CLI::Range(0u, format::kMaxLevelLog2))
+          ->capture_default_str()
+          ->type_name("N");
   command->add_option("--report", arguments->report, "Write a page to look at: curves, worst bricks, bytes by kind")
+      ->excludes(level)
       ->type_name("OUT.html");
   command->add_flag("--json", arguments->json, "Print the figures as one JSON object");
   command->footer(
       "PSNR is 20 log10((max - min) / RMSE) over active voxels; max and min are the source's, background included.\n"
       "Depth is the same over line integrals (optical depth) along nine directions: what pictures are made of.\n"
+      "A level's error is of all voxels, active or not, linear between its own, as if it all lay in active ones.\n"
       "Of effects, each curve, ramp, displacement map and track is held against its description, in its own unit; the\n"
       "numbers must be the same.\n"
       "Exit code 3 when a frame, a grid or an effect of the source is not in the pack, a voxel is active in one of "

@@ -22,10 +22,11 @@ struct GridRow {
   double range = 0;     // max - min of the source's active values and background
   std::string problem;  // "" where the grid was compared
   compiler::DepthError depth{};
+  std::uint32_t level = 0;  // that was measured in the full volume's place
 
   // Decibels over active voxels; infinite where the reconstruction is exact.
   double psnr() const;
-  // The same over line integrals.
+  // The same over line integrals; NaN of a level, where they are not taken.
   double depthPsnr() const;
   // Whether the pack holds what the source holds, whatever its error.
   bool sound() const;
@@ -40,14 +41,17 @@ struct ComparedGrid {
 };
 using ObserveGrid = std::function<void(const ComparedGrid&)>;
 
-// The pack's volume that has a planned volume's name, or the only one of each. Throws Error(input).
+// The pack's full volume that has a planned volume's name, or the only one of each, or that one's level. Throws
+// Error(input).
 const format::VolumeRecord& matchVolume(const format::Pack& pack, const compiler::Plan& plan,
-                                        const compiler::PlannedVolume& volume);
+                                        const compiler::PlannedVolume& volume, std::uint32_t level = 0);
 
 // Rows in order of volume, frame, grid; one frame of the source and one grid of the pack are in memory at a time.
-// `observe` sees every grid that both have. The error is what is wrong with the pack. Throws Error.
+// `observe` sees every grid that both have. With `level` that level is measured, by compiler::measureLevel, and nothing
+// observed. The error is what is wrong with the pack. Throws Error.
 format::Result<std::vector<GridRow>> compareFrames(const format::Pack& pack, const compiler::Plan& plan,
-                                                   const compiler::ImportOptions& options, const ObserveGrid& observe);
+                                                   const compiler::ImportOptions& options, std::uint32_t level,
+                                                   const ObserveGrid& observe);
 
 }  // namespace billow::command
 

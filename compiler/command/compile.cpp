@@ -23,6 +23,7 @@ struct Arguments {
   std::optional<float> maxError;
   compiler::Budget budget;
   std::optional<double> framesPerSecond;
+  std::optional<std::uint32_t> levels;
   std::string metric = "voxel";
   int effort = 1;
   format::Compression compression = format::Compression::small;
@@ -37,6 +38,7 @@ int runCompile(const Arguments& arguments) {
   compiler::CompileOptions options;
   options.import = importOptions(arguments.import);
   options.import.framesPerSecond = arguments.framesPerSecond;
+  options.import.levels = arguments.levels;
   if (arguments.psnr) options.quality.psnr = arguments.psnr;
   // An error bound or a budget alone replaces the default PSNR.
   if ((arguments.maxError || arguments.budget.any()) && !arguments.psnr) options.quality.psnr.reset();
@@ -106,10 +108,18 @@ void addCompile(CLI::App& app, Run& run) {
       ->check(CLI::Range(0, 9))
       ->capture_default_str();
   command
+      ->add_option("--levels", arguments->levels,
+                   "Coarser levels to store besides, to be drawn from afar: 1 of voxels twice as long, 2 also of four "
+                   "times [0, or the manifest's]")
+      ->check(CLI::Range(0u, compiler::kMaxLevels))
+      ->type_name("N");
+  command
       ->add_option("--compress", arguments->compression,
-                   "small: fewest bytes on disk; fast: zstd, read several times as fast [small]")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, format::Compression>{
-          {"small", format::Compression::small}, {"fast", format::Compression::fast}}))
+                   "small: fewest bytes on disk; fast: zstd, read several times as fast; none: as a copy [small]")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, format::Compression>{{"small", format::Compression::small},
+                                                                             {"fast", format::Compression::fast},
+                                                                             {"none", format::Compression::none}}))
       ->type_name("HOW");
   command->add_option("--threads", arguments->threads, "Threads to use [all cores]; the pack does not depend on it")
       ->check(CLI::Range(1u, 1024u))

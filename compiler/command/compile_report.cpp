@@ -32,6 +32,10 @@ void printGrid(const GridReport& grid) {
       "\n{}{}{}: {} frame{}, {} active voxels, worst PSNR {}, largest error {:.4g}, at most {} on the GPU a frame\n",
       grid.volume, grid.volume.empty() ? "" : "/", grid.grid, grid.frames, grid.frames == 1 ? "" : "s",
       grid.activeVoxels, psnrText(grid.worstPsnr), grid.maxError, size(grid.largestFrameGpuBytes));
+  if (grid.level != 0) {
+    fmt::print("  in place of the full volume: worst PSNR {}, largest error {:.4g}\n", psnrText(grid.levelPsnr),
+               grid.levelMaxError);
+  }
   bool header = false;
   for (std::size_t e = 0; e < grid.encodings.size(); ++e) {
     const EncodingTally& tally = grid.encodings[e];
@@ -47,10 +51,15 @@ Json toJson(const GridReport& grid) {
   Json row;
   row["volume"] = grid.volume;
   row["grid"] = grid.grid;
+  if (grid.level != 0) row["factor"] = 1u << grid.level;
   row["frames"] = grid.frames;
   row["activeVoxels"] = grid.activeVoxels;
   row["worstPsnr"] = std::isfinite(grid.worstPsnr) ? Json(grid.worstPsnr) : Json(nullptr);
   row["maxError"] = grid.maxError;
+  if (grid.level != 0) {
+    row["inPlaceOfFull"]["worstPsnr"] = std::isfinite(grid.levelPsnr) ? Json(grid.levelPsnr) : Json(nullptr);
+    row["inPlaceOfFull"]["maxError"] = grid.levelMaxError;
+  }
   row["largestFrameGpuBytes"] = grid.largestFrameGpuBytes;
   for (std::size_t e = 0; e < grid.encodings.size(); ++e) {
     const EncodingTally& tally = grid.encodings[e];

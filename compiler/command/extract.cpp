@@ -20,6 +20,7 @@ using compiler::Fault;
 struct Arguments {
   std::string pack, output, volume;
   std::optional<std::int32_t> frame;
+  std::uint32_t level = 0;
   std::vector<std::string> grids;
   EffectArguments effect;
 };
@@ -67,7 +68,7 @@ std::vector<compiler::VdbOutput> regroup(const std::vector<Extracted>& grids) {
 }
 
 int extractFrame(const format::Pack& pack, std::int32_t number, const Arguments& arguments) {
-  const auto index = findVolume(pack, arguments.volume);
+  const auto index = findVolume(pack, arguments.volume, arguments.level);
   if (!index) throw Error(Fault::commandLine, index.error());
   const format::VolumeRecord& volume = pack.volumes()[*index];
   const std::ptrdiff_t frame = findFrame(pack, volume, number);
@@ -121,11 +122,19 @@ void addExtract(CLI::App& app, Run& run) {
                           ->type_name("NAME");
   CLI::Option* volume =
       command->add_option("--volume", arguments->volume, "The volume, where the pack has several")->type_name("NAME");
+  CLI::Option* level =
+      command
+          ->add_option("--level", arguments->level,
+                       "A coarser level of the volume instead: 1, of voxels twice as long, or 2, of four times")
+          ->check(CLI::Range(0u, format::kMaxLevelLog2))
+          ->capture_default_str()
+          ->type_name("N");
   CLI::Option* effect =
       command->add_option("--effect", arguments->effect.effect, "An effect instead of a frame, rasterised")
           ->excludes(frame)
           ->excludes(grid)
           ->excludes(volume)
+          ->excludes(level)
           ->type_name("NAME");
   command->add_option("--time", arguments->effect.time, "Seconds after the effect's begin")
       ->needs(effect)

@@ -3,26 +3,18 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
-#include <unordered_map>
+
+#include "metric/cell_lookup.h"
 
 namespace billow::command {
 namespace {
 
 using compiler::ImportedGrid;
 using compiler::Leaf;
+using compiler::Origin;
 using compiler::Tile;
-using Origin = std::array<std::int32_t, 3>;
 
 constexpr std::int32_t kCell = 8;
-
-struct OriginHash {
-  std::size_t operator()(const Origin& at) const {
-    std::uint64_t hash = 0;
-    for (const std::int32_t x : at) hash = (hash ^ static_cast<std::uint32_t>(x)) * 0x9e3779b97f4a7c15u;
-    return static_cast<std::size_t>(hash ^ hash >> 32);
-  }
-};
 
 std::uint64_t volumeOf(std::uint32_t dim) {
   return std::uint64_t{dim} * dim * dim;
@@ -33,82 +25,6 @@ std::uint64_t countOf(const format::Mask3& mask) {
   for (const std::uint32_t word : mask.words) count += static_cast<std::uint64_t>(std::popcount(word));
   return count;
 }
-
-// Finds the leaf or tile that covers a cell of 8^3 voxels.
-class Lookup {
- public:
-  explicit Lookup(const ImportedGrid& grid) {
-    for (const Leaf& leaf : grid.leaves) {
-      leaves_.emplace(leaf.origin, &leaf);
-      active_ += countOf(leaf.active);
-    }
-    for (const Tile& tile : grid.tiles) {
-      active_ += volumeOf(tile.dim);
-      if (tile.dim > 128) {
-        large_.push_back(&tile);
-      } else {
-        forEachCell(tile, 128, [&](const Origin& cell) { tiles_.emplace(cell, &tile); });
-      }
-    }
-  }
-
-  std::uint64_t activeVoxels() const { return active_; }
-
-  const Leaf* leafAt(const Origin& cell) const {
-    const auto found = leaves_.find(cell);
-    return found == leaves_.end() ? nullptr : found->second;
-  }
-
-  // The tile that covers the cube of `dim` voxels at `origin` whole.
-  const Tile* tileOver(const Origin& origin, std::uint32_t dim) const {
-    for (const Tile* tile : large_) {
-      if (covers(*tile, origin, dim)) return tile;
-    }
-    const auto [begin, end] = tiles_.equal_range(roundDown(origin, 128));
-    for (auto entry = begin; entry != end; ++entry) {
-      if (covers(*entry->second, origin, dim)) return entry->second;
-    }
-    return nullptr;
-  }
-
- private:
-  static Origin roundDown(const Origin& at, std::int32_t step) {
-    Origin result{};
-    for (std::size_t a = 0; a < 3; ++a) result[a] = at[a] - ((at[a] % step) + step) % step;
-    return result;
-  }
-
-  // The aligned cubes of `step` voxels that a tile touches.
-  template <class Visit>
-  static void forEachCell(const Tile& tile, std::int32_t step, const Visit& visit) {
-    const Origin first = roundDown(tile.origin, step);
-    Origin last{};  // inclusive, so that no cell begins beyond what 32 bits hold
-    for (std::size_t a = 0; a < 3; ++a) {
-      const std::int64_t end = std::int64_t{tile.origin[a]} + tile.dim - 1;
-      last[a] = static_cast<std::int32_t>(std::min<std::int64_t>(end, std::numeric_limits<std::int32_t>::max()));
-    }
-    for (std::int64_t x = first[0]; x <= last[0]; x += step) {
-      for (std::int64_t y = first[1]; y <= last[1]; y += step) {
-        for (std::int64_t z = first[2]; z <= last[2]; z += step) {
-          visit({static_cast<std::int32_t>(x), static_cast<std::int32_t>(y), static_cast<std::int32_t>(z)});
-        }
-      }
-    }
-  }
-
-  static bool covers(const Tile& tile, const Origin& origin, std::uint32_t dim) {
-    for (std::size_t a = 0; a < 3; ++a) {
-      const std::int64_t low = tile.origin[a], at = origin[a];
-      if (at < low || at + dim > low + tile.dim) return false;
-    }
-    return true;
-  }
-
-  std::unordered_map<Origin, const Leaf*, OriginHash> leaves_;
-  std::unordered_multimap<Origin, const Tile*, OriginHash> tiles_;  // by the aligned 128^3 cubes they touch
-  std::vector<const Tile*> large_;
-  std::uint64_t active_ = 0;
-};
 
 class Measure {
  public:
@@ -163,7 +79,7 @@ class Measure {
     error_.maxError = std::max(error_.maxError, difference);
   }
 
-  Lookup lookup_;
+  compiler::CellLookup lookup_;
   GridError error_;
   std::uint64_t matched_ = 0;
 };

@@ -29,7 +29,7 @@ Json toJson(const format::GpuBytes& gpu) {
   return json;
 }
 
-Json toJson(const GridFrameSummary& frame) {
+Json toJson(const GridFrameSummary& frame, bool level) {
   Json json;
   json["frame"] = frame.frame;
   json["present"] = frame.present;
@@ -40,12 +40,17 @@ Json toJson(const GridFrameSummary& frame) {
   json["sourceMin"] = frame.sourceMin;
   json["sourceMax"] = frame.sourceMax;
   json["gpuBytes"] = toJson(frame.gpu);
+  if (level) {
+    json["inPlaceOfFull"]["psnr"] = frame.levelPsnr ? Json(*frame.levelPsnr) : Json(nullptr);
+    json["inPlaceOfFull"]["maxError"] = frame.levelMaxError;
+  }
   return json;
 }
 
 Json toJson(const VolumeSummary& volume) {
   Json json;
   json["name"] = volume.name;
+  if (volume.level != 0) json["factor"] = 1u << volume.level;
   json["framesPerSecond"] = volume.framesPerSecond;
   json["frames"] = Json::array();
   for (const format::FrameRecord& frame : volume.frames) {
@@ -63,9 +68,11 @@ Json toJson(const VolumeSummary& volume) {
     row["role"] = grid.role;
     row["sourceType"] = grid.sourceType;
     row["frames"] = Json::array();
-    for (const GridFrameSummary& frame : grid.frames) row["frames"].push_back(toJson(frame));
+    for (const GridFrameSummary& frame : grid.frames) row["frames"].push_back(toJson(frame, volume.level != 0));
     json["grids"].push_back(row);
   }
+  if (volume.level == 0) json["levels"] = Json::array();
+  for (const VolumeSummary& level : volume.levels) json["levels"].push_back(toJson(level));
   return json;
 }
 
@@ -124,8 +131,8 @@ std::string size(std::uint64_t bytes) {
   return fmt::format("{:.2f} GB", value * 1e-9);
 }
 
-std::string psnrText(const GridFrameSummary& frame) {
-  if (frame.psnr) return fmt::format("{:.2f} dB", *frame.psnr);
+std::string psnrText(const GridFrameSummary& frame, const std::optional<double>& psnr) {
+  if (psnr) return fmt::format("{:.2f} dB", *psnr);
   return frame.activeVoxels > 0 ? "exact" : "-";
 }
 
@@ -153,8 +160,20 @@ void printGrid(const GridSummary& grid) {
       continue;
     }
     fmt::print("  {:>8} {:>13} {:>9} {:>9} {:>11.4g} {:>11} {:>23}\n", frame.frame, frame.activeVoxels, frame.bricks,
-               psnrText(frame), frame.maxError, size(frame.gpu.total()),
+               psnrText(frame, frame.psnr), frame.maxError, size(frame.gpu.total()),
                fmt::format("{:.4g} to {:.4g}", frame.sourceMin, frame.sourceMax));
+  }
+}
+
+// What drawing a level in the full volume's place costs and loses.
+void printLevelGrid(const GridSummary& grid) {
+  fmt::print("\n  {}, in the full volume's place\n", grid.name);
+  fmt::print("  {:>8} {:>13} {:>9} {:>9} {:>11} {:>11}\n", "frame", "active voxels", "bricks", "PSNR", "max error",
+             "on the GPU");
+  for (const GridFrameSummary& frame : grid.frames) {
+    if (!frame.present) continue;
+    fmt::print("  {:>8} {:>13} {:>9} {:>9} {:>11.4g} {:>11}\n", frame.frame, frame.activeVoxels, frame.bricks,
+               psnrText(frame, frame.levelPsnr), frame.levelMaxError, size(frame.gpu.total()));
   }
 }
 
@@ -220,6 +239,11 @@ void printText(const PackSummary& pack) {
     fmt::print("\n{}: {}\n", volume.name, frameText(volume));
     for (const GridSummary& grid : volume.grids) printGrid(grid);
     printLargestFrame(volume);
+    for (const VolumeSummary& level : volume.levels) {
+      fmt::print("\n{}: level of voxels {} times as long\n", level.name, 1u << level.level);
+      for (const GridSummary& grid : level.grids) printLevelGrid(grid);
+      printLargestFrame(level);
+    }
   }
   for (const EffectSummary& effect : pack.effects) printEffect(effect);
   if (!pack.effects.empty()) printEffectBytes(pack);
@@ -251,6 +275,7 @@ void addInfo(CLI::App& app, Run& run) {
   command->footer(
       "On the GPU are all frames and effects at once, what they share counted once; of particles, as many as may be "
       "alive.\n"
+      "A level in its volume's place: errors of all voxels, linear between its own, as if in the active ones.\n"
       "PSNR is 20 log10(range / rmse) over active voxels, range that of the source's values and background.\n"
       "Exit codes: 0 done, 1 command line, 2 the file cannot be read, 3 it is no sound pack.");
   command->callback([&run, arguments] { run = [arguments] { return runInfo(arguments->pack, arguments->json); }; });

@@ -8,18 +8,38 @@
 
 namespace billow::command {
 
-tl::expected<std::uint32_t, std::string> findVolume(const format::Pack& pack, const std::string& name) {
-  const auto volumes = pack.volumes();
-  if (name.empty() && volumes.size() == 1) return 0;
-  if (volumes.empty()) return tl::unexpected(std::string("the pack has no volumes, only effects or nothing"));
+namespace {
+
+// By name, of those that are no level.
+tl::expected<std::uint32_t, std::string> findFull(const format::Pack& pack, const std::string& name) {
+  std::vector<std::uint32_t> full;
   std::vector<std::string_view> names;
-  for (std::uint32_t i = 0; i < volumes.size(); ++i) {
-    names.push_back(pack.string(volumes[i].name));
+  for (std::uint32_t i = 0; i < pack.volumes().size(); ++i) {
+    if (pack.isLevel(i)) continue;
+    full.push_back(i);
+    names.push_back(pack.string(pack.volumes()[i].name));
     if (names.back() == name) return i;
   }
+  if (name.empty() && full.size() == 1) return full.front();
+  if (full.empty()) return tl::unexpected(std::string("the pack has no volumes, only effects or nothing"));
   return tl::unexpected(name.empty() ? fmt::format("the pack has {} volumes; choose one by name: {}", names.size(),
                                                    fmt::join(names, ", "))
                                      : fmt::format("no volume \"{}\"; there is: {}", name, fmt::join(names, ", ")));
+}
+
+}  // namespace
+
+tl::expected<std::uint32_t, std::string> findVolume(const format::Pack& pack, const std::string& name,
+                                                    std::uint32_t level) {
+  const auto full = findFull(pack, name);
+  if (!full || level == 0) return full;
+  std::string stored = "0";
+  for (const format::LevelRecord& record : pack.levelsOf(*full)) {
+    if (record.log2 == level) return record.level;
+    stored += fmt::format(", {}", record.log2);
+  }
+  return tl::unexpected(fmt::format("no level {} of volume \"{}\"; there is: {}", level,
+                                    pack.string(pack.volumes()[*full].name), stored));
 }
 
 tl::expected<std::uint32_t, std::string> findEffect(const format::Pack& pack, const std::string& name) {

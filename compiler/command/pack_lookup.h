@@ -12,9 +12,10 @@
 
 namespace billow::command {
 
-// The index of the volume with this name; "" takes the only one. The error is a sentence for the user that lists what
-// there is.
-tl::expected<std::uint32_t, std::string> findVolume(const format::Pack& pack, const std::string& name);
+// The index of the volume with this name, or of its level with voxels 2^level times as long; "" takes the only one that
+// is no level. The error is a sentence for the user that lists what there is.
+tl::expected<std::uint32_t, std::string> findVolume(const format::Pack& pack, const std::string& name,
+                                                    std::uint32_t level = 0);
 
 // The same for effects.
 tl::expected<std::uint32_t, std::string> findEffect(const format::Pack& pack, const std::string& name);

@@ -51,6 +51,24 @@ VolumeSummary summariseVolume(const format::Pack& pack, const format::VolumeReco
   return summary;
 }
 
+VolumeSummary summariseLevel(const format::Pack& pack, const format::LevelRecord& level) {
+  const format::VolumeRecord& full = pack.volumes()[level.volume];
+  VolumeSummary summary = summariseVolume(pack, pack.volumes()[level.level]);
+  summary.level = level.log2;
+  for (std::uint32_t g = 0; g < full.gridCount; ++g) {
+    for (std::uint32_t f = 0; f < full.frameCount; ++f) {
+      const format::GridFrame& source = pack.gridFrame(full, f, g);
+      const format::LevelError& error = pack.levelError(level, f, g);
+      const double range = static_cast<double>(source.sourceMax) - static_cast<double>(source.sourceMin);
+      const double psnr = format::psnr(range, error.squaredError, source.activeVoxels);
+      GridFrameSummary& frame = summary.grids[g].frames[f];
+      if (psnr < std::numeric_limits<double>::infinity()) frame.levelPsnr = psnr;
+      frame.levelMaxError = static_cast<double>(error.maxError);
+    }
+  }
+  return summary;
+}
+
 EffectSummary summariseEffect(const format::Pack& pack, const format::EffectRecord& effect) {
   const format::EffectTables& tables = pack.effects();
   EffectSummary summary;
@@ -116,7 +134,13 @@ format::Result<PackSummary> summarise(const std::string& path) {
   format::Result<std::string> info = pack->infoJson();
   if (!info) return tl::make_unexpected(info.error());
   summary.infoJson = std::move(*info);
-  for (const format::VolumeRecord& volume : pack->volumes()) summary.volumes.push_back(summariseVolume(*pack, volume));
+  for (std::uint32_t v = 0; v < pack->volumes().size(); ++v) {
+    if (pack->isLevel(v)) continue;
+    summary.volumes.push_back(summariseVolume(*pack, pack->volumes()[v]));
+    for (const format::LevelRecord& level : pack->levelsOf(v)) {
+      summary.volumes.back().levels.push_back(summariseLevel(*pack, level));
+    }
+  }
   for (const format::EffectRecord& effect : pack->effects().effects) {
     summary.effects.push_back(summariseEffect(*pack, effect));
   }

@@ -22,6 +22,9 @@ struct GridFrameSummary {
   double sourceMin = 0, sourceMax = 0;
   std::uint64_t bricks = 0;  // Node3s, constants included
   format::GpuBytes gpu;
+  // Of a level, drawn in the full volume's place, against its source; absent where exact, as above.
+  std::optional<double> levelPsnr;
+  double levelMaxError = 0;
 };
 
 struct GridSummary {
@@ -36,6 +39,8 @@ struct VolumeSummary {
   double framesPerSecond = 0;
   std::vector<format::FrameRecord> frames;
   std::vector<GridSummary> grids;
+  std::uint32_t level = 0;  // its voxels are 2^level times as long as those of the volume that it is a level of
+  std::vector<VolumeSummary> levels;
 };
 
 struct EmitterSummary {

@@ -178,6 +178,10 @@ void addLightOptions(CLI::App& command, RenderArguments& arguments) {
 void addSourceOptions(CLI::App& command, RenderArguments& arguments) {
   GridNames& grids = arguments.grids;
   command.add_option("--volume", arguments.volume, "The volume, where the pack has several");
+  command
+      .add_option("--level", arguments.level,
+                  "A coarser level of the volume in its place: 1, of voxels twice as long, or 2, of four times")
+      ->check(CLI::Range(0u, format::kMaxLevelLog2));
   command.add_option("--extinction", grids.extinction, "Grid to take as smoke, or none (default: by the pack's roles)");
   command.add_option("--temperature", grids.temperature, "Grid to take as temperature, or none");
   command.add_option("--flames", grids.flames, "Grid to take as flames, or none");
@@ -225,16 +229,18 @@ void addMethodOptions(CLI::App& command, RenderArguments& arguments) {
 // What the options say of a pack's volume, grids and effects. A scene that lists volumes and effects says it all.
 Checked<void> applySources(const RenderArguments& arguments, RenderRequest& request) {
   const GridNames& grids = arguments.grids;
-  const bool named = arguments.volume || grids.extinction || grids.temperature || grids.flames;
+  const bool named = arguments.volume || arguments.level || grids.extinction || grids.temperature || grids.flames;
   if (request.scene) {
     if (!named && arguments.effects.empty()) return {};
-    return refuse(kCommandLine,
-                  fmt::format("{}: the scene lists what it holds; --volume, --extinction, --temperature, --flames and "
-                              "--effect are for packs",
-                              arguments.input));
+    return refuse(
+        kCommandLine,
+        fmt::format("{}: the scene lists what it holds; --volume, --level, --extinction, --temperature, --flames and "
+                    "--effect are for packs",
+                    arguments.input));
   }
   VolumeRequest& volume = request.volumes.front();
   overrideWith(arguments.volume, volume.volume);
+  volume.level = arguments.level.value_or(volume.level);
   overrideWith(grids.extinction, volume.grids.extinction);
   overrideWith(grids.temperature, volume.grids.temperature);
   overrideWith(grids.flames, volume.grids.flames);

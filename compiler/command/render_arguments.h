@@ -18,6 +18,7 @@ struct RenderArguments {
       albedo, ambient;
   std::string shadows = "nearest";
   std::optional<std::string> volume;
+  std::optional<std::uint32_t> level;
   GridNames grids;
   std::vector<std::string> effects;
   RenderRequest direct;  // what CLI11 checks by itself

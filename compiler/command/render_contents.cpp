@@ -141,7 +141,7 @@ Checked<const format::Pack*> Contents::open(const std::string& file, const std::
 Checked<void> Contents::addVolume(const VolumeRequest& request, runtime::Interpolation interpolation) {
   const auto pack = open(request.pack, request.place);
   if (!pack) return tl::unexpected(pack.error());
-  const auto number = findVolume(**pack, request.volume.value_or(""));
+  const auto number = findVolume(**pack, request.volume.value_or(""), request.level);
   if (!number) return missing(request.place, request.pack, number.error());
   PlacedVolume volume{.request = &request, .pack = *pack, .number = *number, .grids = {}, .suggested = {}, .still = {}};
   const auto grids = findGrids(**pack, volume.record(), request);

@@ -56,6 +56,7 @@ enum class AfterLast { hold, loop, vanish };
 struct VolumeRequest {
   std::string pack;
   std::optional<std::string> volume;  // needed where the pack has several
+  std::uint32_t level = 0;            // 0, or a coarser level of it
   GridNames grids;
   LookRequest look;  // over the request's
   Matrix transform = kIdentity;

@@ -74,7 +74,7 @@ void readContents(const Value& scene, const std::filesystem::path& folder, Rende
     if (const auto rate = scene.find("framesPerSecond")) rate->fail("none beside \"pack\", whose frames have numbers");
     return readSource(scene, folder, request.volumes.front());
   }
-  for (const char* single : {"pack", "volume", "grids"}) {
+  for (const char* single : {"pack", "volume", "level", "grids"}) {
     if (const auto given = scene.find(single)) given->fail("none beside \"volumes\" or \"effects\", which name packs");
   }
   if (volumes) readVolumes(*volumes, folder, request);
@@ -83,8 +83,8 @@ void readContents(const Value& scene, const std::filesystem::path& folder, Rende
 }
 
 void readDocument(const Value& scene, const std::filesystem::path& folder, RenderRequest& request) {
-  scene.requireKeys({"$schema", "pack", "volume", "grids", "volumes", "effects", "framesPerSecond", "voxelSize",
-                     "camera", "sun", "look", "background", "size", "exposure", "filter"});
+  scene.requireKeys({"$schema", "pack", "volume", "level", "grids", "volumes", "effects", "framesPerSecond",
+                     "voxelSize", "camera", "sun", "look", "background", "size", "exposure", "filter"});
   readContents(scene, folder, request);
   if (const auto edge = scene.find("voxelSize")) request.voxelSize = edge->number({1e-9, 1e9});
   if (const auto camera = scene.find("camera")) readCamera(*camera, request);
@@ -108,6 +108,9 @@ void readNumber(const Value& object, const char* key, const Range& range, float&
 void readSource(const Value& value, const std::filesystem::path& folder, VolumeRequest& volume) {
   volume.pack = (folder / value.at("pack").text("the path of a pack")).string();
   readText(value, "volume", "a volume's name", volume.volume);
+  if (const auto level = value.find("level")) {
+    volume.level = static_cast<std::uint32_t>(level->integer(0, format::kMaxLevelLog2));
+  }
   if (const auto grids = value.find("grids")) readGrids(*grids, volume.grids);
 }
 

@@ -141,7 +141,8 @@ void readVolumes(const Value& list, const std::filesystem::path& folder, RenderR
   const auto items = list.items("a list of volumes");
   if (items.size() > kMostVolumes) list.fail(fmt::format("at most {} volumes", kMostVolumes));
   for (const Value& item : items) {
-    item.requireKeys({"pack", "volume", "grids", "transform", "begin", "framesPerSecond", "after", "frame", "look"});
+    item.requireKeys(
+        {"pack", "volume", "level", "grids", "transform", "begin", "framesPerSecond", "after", "frame", "look"});
     VolumeRequest volume;
     volume.place = item.place();
     readSource(item, folder, volume);

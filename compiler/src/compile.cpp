@@ -44,7 +44,8 @@ CompileReport compile(const std::vector<std::string>& inputs, const std::string&
                       const Warn& warn) {
   std::optional<tbb::global_control> limit;
   if (options.threads != 0) limit.emplace(tbb::global_control::max_allowed_parallelism, options.threads);
-  const Plan plan = planInputs(inputs, options.import, warn);
+  Plan plan = planInputs(inputs, options.import, warn);
+  addLevels(plan);
   refuseToReplaceInputs(plan, output);
   if (options.budget.any() && plan.volumes.empty()) {
     throw Error(Fault::commandLine, "a budget needs volumes to spend it on; there are only effects");

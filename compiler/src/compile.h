@@ -1,10 +1,12 @@
-// The whole compile: plan -> import -> try encodings (frames in parallel) -> choose -> share -> write (in frame order).
+// The whole compile: plan -> import (and coarsen) -> try encodings (frames in parallel) -> choose -> share -> write (in
+// frame order).
 #ifndef BILLOW_COMPILER_COMPILE_H
 #define BILLOW_COMPILER_COMPILE_H
 
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,7 +20,7 @@ namespace billow::compiler {
 // Sizes that the pack keeps to, with the least error that fits; quality.psnr is then not looked at, quality.maxError
 // holds as well.
 struct Budget {
-  // Of all frames, grids and effects together, what they share counted once (CompileReport::gpuBytes).
+  // Of all frames, grids, levels and effects together, what they share counted once (CompileReport::gpuBytes).
   std::optional<std::uint64_t> gpu;
   std::optional<std::uint64_t> disk;  // the file's size
   bool any() const { return gpu || disk; }
@@ -46,12 +48,17 @@ struct EncodingTally {
 
 struct GridReport {
   std::string volume, grid;
+  std::uint32_t level = 0;   // PlannedVolume::level
   std::uint32_t frames = 0;  // in which the grid is present
   std::uint64_t activeVoxels = 0;
   std::array<EncodingTally, format::kEncodingCount> encodings{};
   double worstPsnr = 0;  // dB, over frames; infinite where exact
   float maxError = 0;
   std::uint64_t largestFrameGpuBytes = 0;
+  // Of a level drawn in its volume's place, against the source at full resolution (format::LevelError): the worst over
+  // frames, all of the difference as if in active voxels. What stands above is against its own means.
+  double levelPsnr = std::numeric_limits<double>::infinity();
+  float levelMaxError = 0;
 };
 
 struct EffectReport {
@@ -65,7 +72,7 @@ struct CompileReport {
   std::vector<EffectReport> effects;
   std::uint64_t effectBytes = 0;     // of all, on disk
   std::uint64_t effectGpuBytes = 0;  // format::effectGpuBytes
-  std::size_t frames = 0;
+  std::size_t frames = 0;            // of volumes, those of their levels not counted
   std::uint64_t fileBytes = 0;
   std::uint64_t gpuBytes = 0;  // format::packGpuBytes, and those of effects
 };

@@ -1,5 +1,5 @@
 // The compiler's stages, in pipeline order, and what passes between them. This header is the architecture:
-//   plan -> import -> encode -> choose -> share -> write
+//   plan -> import (-> coarsen) -> encode -> choose -> share -> write
 #ifndef BILLOW_COMPILER_STAGES_H
 #define BILLOW_COMPILER_STAGES_H
 
@@ -49,7 +49,11 @@ struct ImportOptions {
   NonFinite nonFinite = NonFinite::error;
   bool sdfToFog = false;
   std::optional<double> framesPerSecond;  // default: the manifest's, else 24
+  std::optional<std::uint32_t> levels;    // 0 to kMaxLevels; default: the manifest's, else kDefaultLevels
 };
+
+inline constexpr std::uint32_t kMaxLevels = 2;  // of 2 and 4 times as long voxels
+inline constexpr std::uint32_t kDefaultLevels = 0;
 
 struct PlannedGrid {
   std::string name;    // "density", or "velocity.x" for a component of a vec3 grid
@@ -72,6 +76,9 @@ struct PlannedVolume {
   std::vector<PlannedFrame> frames;  // ascending numbers
   double framesPerSecond = 24;
   format::LookRecord look{};
+  std::uint32_t levels = 0;  // coarser ones that are wanted
+  std::uint32_t level = 0;   // of one of them: its voxels are 2^level times as long
+  std::size_t full = 0;      // with it: the plan's volume that it is a level of
 };
 
 struct Plan {
@@ -83,6 +90,10 @@ struct Plan {
 // and *.effect.json beside any of them.
 // Throws Error.
 Plan planInputs(const std::vector<std::string>& inputs, const ImportOptions& options, const Warn& warn);
+
+// The levels of all volumes as further volumes behind them, in the order of the pack's records; of the same files.
+// Throws Error(input) where a volume has a name that a level needs.
+void addLevels(Plan& plan);
 
 // ---- import: one frame's grids as leaves and tiles, all scalar floats.
 
@@ -114,7 +125,7 @@ struct ImportedFrame {
   std::vector<ImportedGrid> grids;  // as PlannedVolume::grids; absent ones have present == false
 };
 
-// Reads one planned frame. Thread-safe. Throws Error.
+// Reads one planned frame, of a level the full volume's. Thread-safe. Throws Error.
 ImportedFrame importFrame(const PlannedVolume& volume, const PlannedFrame& frame, const ImportOptions& options,
                           const Warn& warn);
 

@@ -39,7 +39,7 @@ std::vector<GridRequest> readGrids(const Value& node) {
 }
 
 VolumeRequest readVolume(const Value& node, const std::filesystem::path& folder, const ImportOptions& options) {
-  node.requireKeys({"name", "inputs", "grids", "fps", "frames", "missing", "look"});
+  node.requireKeys({"name", "inputs", "grids", "fps", "frames", "missing", "levels", "look"});
   VolumeRequest volume;
   volume.options = options;
   volume.name = node.at("name").name("a volume's name");
@@ -53,6 +53,10 @@ VolumeRequest readVolume(const Value& node, const std::filesystem::path& folder,
   }
   if (const auto frames = node.find("frames")) readFrames(*frames, volume.options);
   if (const auto missing = node.find("missing")) readMissing(*missing, volume.options);
+  if (const auto levels = node.find("levels")) {
+    const auto count = static_cast<std::uint32_t>(levels->integer(0, kMaxLevels));
+    if (!options.levels) volume.options.levels = count;
+  }
   if (const auto look = node.find("look")) volume.look = json::readLook(*look);
   return volume;
 }

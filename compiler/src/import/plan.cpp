@@ -233,6 +233,7 @@ Planned planVolume(const VolumeRequest& request, const Warn& warn) {
   volume.name = request.name.empty() ? packName(volumeName(first), first + ": the volume", warn) : request.name;
   volume.look = request.look;
   volume.framesPerSecond = request.options.framesPerSecond.value_or(24);
+  volume.levels = request.options.levels.value_or(kDefaultLevels);
   if (!(volume.framesPerSecond >= 0.001 && volume.framesPerSecond <= 1e6)) {
     throw Error(Fault::commandLine,
                 fmt::format("{} frames per second; expected 0.001 to 1000000", volume.framesPerSecond));
@@ -333,6 +334,26 @@ Plan planInputs(const std::vector<std::string>& inputs, const ImportOptions& opt
     plan.volumes.push_back(std::move(planned.volume));
   }
   return plan;
+}
+
+void addLevels(Plan& plan) {
+  const std::size_t full = plan.volumes.size();
+  std::set<std::string> names;
+  for (const PlannedVolume& volume : plan.volumes) names.insert(volume.name);
+  for (std::size_t v = 0; v < full; ++v) {
+    for (std::uint32_t level = 1; level <= plan.volumes[v].levels; ++level) {
+      PlannedVolume coarse = plan.volumes[v];
+      coarse.name += fmt::format(" 1:{}", 1u << level);
+      if (!names.insert(coarse.name).second) {
+        throw Error(Fault::input, fmt::format("volume '{}' has the name that a level of '{}' needs; give it another",
+                                              coarse.name, plan.volumes[v].name));
+      }
+      coarse.levels = 0;
+      coarse.level = level;
+      coarse.full = v;
+      plan.volumes.push_back(std::move(coarse));
+    }
+  }
 }
 
 }  // namespace billow::compiler

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 #include <tbb/parallel_pipeline.h>
 
+#include <array>
 #include <set>
 #include <span>
+
+#include "level/coarsen.h"
 
 namespace billow::compiler {
 namespace {
@@ -15,6 +18,12 @@ constexpr std::size_t kFramesInFlight = 2;
 static_assert(sizeof(Tile) == 20, "Tile has no padding that a hash would meet");
 
 using FramePtr = std::shared_ptr<FrameWork>;
+
+// Of a level, apart from all full volumes' and from other levels of equal ones.
+Hash128 contentOf(const Hash128& content, const Hash128& source, std::uint32_t level) {
+  const std::array<std::uint64_t, 5> parts{content[0], content[1], source[0], source[1], level};
+  return hashOf(std::as_bytes(std::span(parts)));
+}
 
 Hash128 contentOf(const ImportedGrid& grid, const std::vector<LeafKey>& keys) {
   static_assert(sizeof(LeafKey) == 32);  // 4 of padding, left out here
@@ -67,13 +76,27 @@ class Pipeline {
     const PlannedVolume& volume = run_.plan.volumes[job.volume];
     frame->held = (volume.frames[job.frame].flags & format::kFrameHeld) != 0;
     if (frame->held) return frame;
-    frame->imported = importFrame(volume, volume.frames[job.frame], run_.import, run_.warn);
-    for (const ImportedGrid& grid : frame->imported.grids) {
+    // The full volume's frames have told what there is to tell.
+    const Warn silent = [](const std::string&) {};
+    frame->imported =
+        importFrame(volume, volume.frames[job.frame], run_.import, volume.level == 0 ? run_.warn : silent);
+    if (volume.level != 0) coarsenFrame(volume.level, *frame);
+    for (std::size_t g = 0; g < frame->imported.grids.size(); ++g) {
+      const ImportedGrid& grid = frame->imported.grids[g];
       GridWork& work = frame->grids.emplace_back();
       work.keys = leafKeys(grid);
       work.content = contentOf(grid, work.keys);
+      if (volume.level == 0) continue;
+      const ImportedGrid& source = frame->source.grids[g];
+      work.content = contentOf(work.content, contentOf(source, leafKeys(source)), volume.level);
     }
     return frame;
+  }
+
+  static void coarsenFrame(std::uint32_t level, FrameWork& frame) {
+    frame.source = std::move(frame.imported);
+    frame.imported.grids.clear();
+    for (const ImportedGrid& grid : frame.source.grids) frame.imported.grids.push_back(coarsen(grid, level));
   }
 
   // Cheap, so it may be serial: then what is tried does not depend on how far other frames are.

@@ -23,7 +23,9 @@ struct Job {
 };
 
 struct GridWork {
-  Hash128 content{};   // hash of all that the grid's tree depends on: voxels, tiles, background, no transform
+  // Hash of all that the grid's tree depends on: voxels, tiles, background, no transform; of a level also what it is
+  // of.
+  Hash128 content{};
   bool isNew = false;  // present, and no frame or grid before has this content
   // The rest only where isNew.
   std::vector<LeafKey> keys;
@@ -37,6 +39,7 @@ struct FrameWork {
   Job job;
   bool held = false;  // repeats the frame before; then the rest is empty
   ImportedFrame imported;
+  ImportedFrame source;  // of a level: what it was made from
   std::vector<GridWork> grids;
 };
 

@@ -7,7 +7,10 @@
 #include "billow/format/gpu_size.h"
 #include "billow/format/psnr.h"
 #include "choose/decide.h"
+#include "choose/decode_stored.h"
 #include "effect/bake_effect.h"
+#include "encode/error_sums.h"
+#include "level/level_error.h"
 
 namespace billow::compiler {
 namespace {
@@ -15,7 +18,9 @@ namespace {
 std::string settingsJson(const CompileOptions& options) {
   nlohmann::ordered_json info;
   info["generator"] = "billow " BILLOW_VERSION;
-  info["compression"] = options.compression == format::Compression::small ? "small" : "fast";
+  info["compression"] = options.compression == format::Compression::small  ? "small"
+                        : options.compression == format::Compression::fast ? "fast"
+                                                                           : "none";
   auto& quality = info["quality"];
   quality["effort"] = options.quality.effort;
   if (options.quality.psnr && !options.budget.any()) quality["psnr"] = *options.quality.psnr;
@@ -30,6 +35,7 @@ format::PackWriter::Options writerOptions(const CompileOptions& options, const P
   format::PackWriter::Options result;
   result.compression = options.compression;
   result.threads = options.threads;
+  result.levels = std::ranges::any_of(plan.volumes, [](const PlannedVolume& volume) { return volume.level != 0; });
   result.effects = !plan.effects.empty();
   return result;
 }
@@ -80,6 +86,7 @@ void WritePass::addVolume(const PlannedVolume& volume) {
     GridReport gridReport;
     gridReport.volume = volume.name;
     gridReport.grid = grid.name;
+    gridReport.level = volume.level;
     gridReport.worstPsnr = std::numeric_limits<double>::infinity();
     report_.grids.push_back(gridReport);
   }
@@ -88,11 +95,23 @@ void WritePass::addVolume(const PlannedVolume& volume) {
     tables_.frames.push_back({frame.number, frame.flags, time});
   }
   tables_.volumes.push_back(record);
+  if (volume.level != 0) addLevel(volume);
+}
+
+void WritePass::addLevel(const PlannedVolume& volume) {
+  std::size_t errors = 0;  // of the levels before
+  for (const format::LevelRecord& before : tables_.levels) {
+    const format::VolumeRecord& other = tables_.volumes[before.level];
+    errors += std::size_t{other.frameCount} * other.gridCount;
+  }
+  tables_.levels.push_back({static_cast<std::uint32_t>(volume.full),
+                            static_cast<std::uint32_t>(tables_.volumes.size() - 1), volume.level,
+                            static_cast<std::uint32_t>(errors)});
 }
 
 void WritePass::run(const GoalFunction& goal, const Warn& warn) {
-  report_.frames = frameCount(plan_);
-  if (options_.progress) options_.progress(0, report_.frames);
+  for (const PlannedVolume& volume : plan_.volumes) report_.frames += volume.level == 0 ? volume.frames.size() : 0;
+  if (options_.progress) options_.progress(0, frameCount(plan_));
   runFrames(
       {plan_, options_.import, options_.quality.effort, warn, goal, [this](const FrameWork& frame) { write(frame); }});
   tables_.infoJson = settingsJson(options_);
@@ -103,14 +122,21 @@ void WritePass::run(const GoalFunction& goal, const Warn& warn) {
 void WritePass::write(const FrameWork& frame) {
   const std::size_t grids = plan_.volumes[frame.job.volume].grids.size();
   const std::uint32_t firstReport = tables_.volumes[frame.job.volume].firstGrid;
-  if (frame.job.frame == 0) before_.assign(grids, {});
+  const bool level = plan_.volumes[frame.job.volume].level != 0;
+  if (frame.job.frame == 0) {
+    before_.assign(grids, {});
+    // A level is read where the full volume is not, so the two have no page in common.
+    if (level) sharer_.emplace(writer_);
+    if (level) writer_.endPage();
+  }
   for (std::size_t g = 0; g < grids; ++g) {
     tables_.gridFrames.push_back(frame.held ? tables_.gridFrames[tables_.gridFrames.size() - grids]
                                             : addGridFrame(frame, g));
+    if (level) addLevelError(frame, g);
     if (!frame.held) tally(frame, g, report_.grids[firstReport + g]);
   }
   ++done_;
-  if (options_.progress) options_.progress(done_, report_.frames);
+  if (options_.progress) options_.progress(done_, frameCount(plan_));
 }
 
 format::GridFrame WritePass::addGridFrame(const FrameWork& frame, std::size_t g) {
@@ -130,7 +156,7 @@ format::GridFrame WritePass::addNew(const FrameWork& frame, std::size_t g) {
   ChosenGrid chosen;
   if (work.trials) chosen = decide(imported, *work.goal, *work.trials, before_[g], work.unchanged, where);
   std::vector<std::uint32_t> pages;
-  format::GridFrame record = sharer_.addGrid(imported, chosen, where, pages);
+  format::GridFrame record = sharer_->addGrid(imported, chosen, where, pages);
   record.flags = format::kGridPresent;
   record.pageListBegin = static_cast<std::uint32_t>(tables_.pageLists.size());
   record.pageListCount = static_cast<std::uint32_t>(pages.size());
@@ -146,8 +172,32 @@ format::GridFrame WritePass::addNew(const FrameWork& frame, std::size_t g) {
     tally.squaredError += brick.squaredError;
     tally.activeVoxels += work.trials->activeVoxels(i);
   }
+  if (plan_.volumes[frame.job.volume].level != 0) entry.levelError = levelErrorOf(frame, g, chosen);
   before_[g].keep(imported, chosen);
   return record;
+}
+
+format::LevelError WritePass::levelErrorOf(const FrameWork& frame, std::size_t g, const ChosenGrid& chosen) const {
+  ImportedGrid decoded = frame.imported.grids[g];
+  for (std::size_t i = 0; i < decoded.leaves.size(); ++i) {
+    Leaf& leaf = decoded.leaves[i];
+    decodeStored(chosen.bricks[i], leaf.active, decoded.background, leaf.values);
+  }
+  const LevelDifference difference =
+      measureLevel(frame.source.grids[g], decoded, plan_.volumes[frame.job.volume].level);
+  return {difference.squaredError, roundUp(difference.maxError), 0};
+}
+
+void WritePass::addLevelError(const FrameWork& frame, std::size_t g) {
+  const std::size_t grids = plan_.volumes[frame.job.volume].grids.size();
+  auto& errors = tables_.levelErrors;
+  if (frame.held) {
+    errors.push_back(errors[errors.size() - grids]);
+  } else if (!frame.imported.grids[g].present) {
+    errors.push_back({0, 0, 0});
+  } else {
+    errors.push_back(written_.at(frame.grids[g].content).levelError);
+  }
 }
 
 void WritePass::tally(const FrameWork& frame, std::size_t g, GridReport& report) const {
@@ -165,6 +215,13 @@ void WritePass::tally(const FrameWork& frame, std::size_t g, GridReport& report)
   }
   report.worstPsnr = std::min(report.worstPsnr, format::psnr(record));
   report.maxError = std::max(report.maxError, record.maxError);
+  if (report.level != 0) {
+    const ImportedGrid& source = frame.source.grids[g];
+    const format::LevelError& error = tables_.levelErrors.back();
+    const double range = static_cast<double>(source.max) - static_cast<double>(source.min);
+    report.levelPsnr = std::min(report.levelPsnr, format::psnr(range, error.squaredError, source.activeVoxels));
+    report.levelMaxError = std::max(report.levelMaxError, error.maxError);
+  }
   report.largestFrameGpuBytes = std::max(report.largestFrameGpuBytes, format::gpuBytes(record).total());
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,19 +32,23 @@ class WritePass {
   // What a grid in a frame became, for frames that hold the same again.
   struct Written {
     format::GridFrame record;
+    format::LevelError levelError;  // of a level
     std::array<EncodingTally, format::kEncodingCount> encodings;
   };
 
   void addVolume(const PlannedVolume& volume);
+  void addLevel(const PlannedVolume& volume);
   void write(const FrameWork& frame);
   format::GridFrame addGridFrame(const FrameWork& frame, std::size_t g);
   format::GridFrame addNew(const FrameWork& frame, std::size_t g);
+  format::LevelError levelErrorOf(const FrameWork& frame, std::size_t g, const ChosenGrid& chosen) const;
+  void addLevelError(const FrameWork& frame, std::size_t g);
   void tally(const FrameWork& frame, std::size_t g, GridReport& report) const;
 
   const CompileOptions& options_;
   const Plan& plan_;
   format::PackWriter writer_;
-  Sharer sharer_;
+  std::optional<Sharer> sharer_;  // of the full volumes, then of one level after the other
   format::PackTables tables_;
   std::uint32_t gridFrames_ = 0;
   std::vector<FrameBefore> before_;     // by grid of the volume at hand: the last frame in which it was new
