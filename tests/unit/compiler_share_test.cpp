@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <random>
 
 #include "billow/format/grid_view.h"
 #include "billow/format/validate.h"
@@ -151,6 +152,37 @@ TEST_F(ShareTest, EqualFramesCostNothing) {
   const format::Pack pack = open();
   EXPECT_LT(pack.fileSize(), one + 3 * 512);
   EXPECT_EQ(pack.gridFrames()[0].node5, pack.gridFrames()[3].node5);
+}
+
+// Frames of about 200 KB each that have a few bricks of the first in common: none reads more than its own share of
+// pages.
+TEST_F(ShareTest, FewEqualBricksMakeNoFrameReadOldPages) {
+  std::vector<ImportedGrid> grids;
+  std::vector<ChosenGrid> chosen;
+  std::mt19937 random(1);
+  for (std::int32_t frame = 0; frame < 8; ++frame) {
+    grids.push_back(emptyGrid());
+    chosen.emplace_back();
+    for (std::int32_t i = 0; i < 400; ++i) {
+      Leaf leaf{};
+      leaf.origin = {8 * (i % 20), 8 * (i / 20), 0};
+      std::fill(std::begin(leaf.active.words), std::end(leaf.active.words), ~0u);
+      grids.back().leaves.push_back(leaf);
+      grids.back().activeVoxels += format::kBrickVoxels;
+      std::vector<std::byte> payload(512, static_cast<std::byte>(i));
+      // Bricks 0, 40, 80... are the same in all frames.
+      for (std::byte& byte : payload) byte = i % 40 == 0 ? byte : static_cast<std::byte>(random());
+      chosen.back().bricks.push_back({format::uniformEncoding(8), false, 0, 0.01f, payload});
+    }
+  }
+  writePack(grids, chosen);
+  const format::Pack pack = open();
+  for (const format::GridFrame& frame : pack.gridFrames()) EXPECT_LE(frame.pageListCount, 3u);
+  // Equal frames are the same all the same, however their pages are filled.
+  grids.push_back(grids[2]);
+  chosen.push_back(chosen[2]);
+  writePack(grids, chosen);
+  EXPECT_EQ(open().gridFrames()[8].node5, pack.gridFrames()[2].node5);
 }
 
 // 64 zero bytes are a uniform brick of one bit as well as a coarse one.

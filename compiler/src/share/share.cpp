@@ -7,6 +7,7 @@
 #include <bit>
 #include <map>
 #include <memory>
+#include <new>
 #include <tuple>
 
 #include "billow/format/bfloat16.h"
@@ -33,6 +34,14 @@ constexpr std::uint32_t kNode5Children = 1u << (3 * format::kNode5Log2);
 
 // A tile that is cut up because the grid's origin is not aligned with it may become at most this many small ones.
 constexpr std::uint64_t kMaxCutTiles = 1u << 24;
+
+// A page is read for its equal content where that is at least one part of so many.
+constexpr std::uint32_t kLeastUse = 4;
+
+// Equal bytes are one brick only where they mean the same; BC7's axes are told by the Node3.
+std::uint32_t meaningOf(const ChosenBrick& brick) {
+  return format::isBc7(brick.encoding) ? format::kEncodingBc7Z : brick.encoding;
+}
 
 void growPages(std::vector<std::uint32_t>& pages, std::uint32_t page) {
   if (pages.empty() || pages.back() != page) pages.push_back(page);
@@ -111,11 +120,9 @@ class TreeBuilder {
     }
   }
 
-  // Equal bytes are one brick only where they mean the same; BC7's axes are told by the Node3.
   std::uint32_t internBrick(const ChosenBrick& brick) {
-    const std::uint32_t meaning = format::isBc7(brick.encoding) ? format::kEncodingBc7Z : brick.encoding;
     const auto units = static_cast<std::uint32_t>(brick.payload.size() / format::kBrickUnitBytes);
-    return intern(Stream::unit, brick.payload.data(), units, meaning);
+    return intern(Stream::unit, brick.payload.data(), units, meaningOf(brick));
   }
 
   Summary addLeaf(const Leaf& leaf, const ChosenBrick& brick) {
@@ -312,14 +319,27 @@ Sharer::Key Sharer::keyOf(Stream stream, const void* bytes, std::size_t size, st
   return {hash.low64, hash.high64};
 }
 
+const std::uint32_t* Sharer::find(const Key& key) const {
+  if (const auto at = recent_.find(key); at != recent_.end()) return &at->second;
+  const auto old = older_.find(key);
+  return old != older_.end() ? &old->second : nullptr;
+}
+
 std::uint32_t Sharer::intern(Stream stream, const void* items, std::uint32_t count, std::uint32_t meaning) {
   const std::size_t bytes = std::size_t{count} * format::kStreamItemBytes[static_cast<std::size_t>(stream)];
   const Key key = keyOf(stream, items, bytes, meaning);
-  const auto [at, isNew] = recent_.try_emplace(key, 0u);
-  if (!isNew) return at->second;
-  const auto old = older_.find(key);
-  const std::uint32_t index = old != older_.end() ? old->second : writer_.append(stream, items, count);
-  at->second = index;
+  const auto reads = [&](std::uint32_t page) { return page >= openPage_ || pageUses_.contains(page); };
+  const std::uint32_t* const known = find(key);
+  std::uint32_t index = 0;
+  if (known != nullptr && reads(writer_.pageOf(stream, *known))) {
+    index = *known;
+  } else {
+    index = writer_.append(stream, items, count);
+    const std::uint32_t page = writer_.pageOf(stream, index);
+    if (page >= pageBytes_.size()) pageBytes_.resize(page + 1);
+    pageBytes_[page] += static_cast<std::uint32_t>(bytes);
+  }
+  recent_[key] = index;
   if (recent_.size() >= kGeneration) {
     older_ = std::move(recent_);
     recent_.clear();
@@ -327,9 +347,60 @@ std::uint32_t Sharer::intern(Stream stream, const void* items, std::uint32_t cou
   return index;
 }
 
+void Sharer::countUse(Stream stream, const void* items, std::size_t bytes, std::uint32_t meaning) {
+  const std::uint32_t* const known = find(keyOf(stream, items, bytes, meaning));
+  if (known == nullptr) return;
+  const std::uint32_t page = writer_.pageOf(stream, *known);
+  if (page < openPage_) pageUses_[page] += static_cast<std::uint32_t>(bytes);
+}
+
+void Sharer::beginGrid(const ImportedGrid& grid, std::span<const ChosenBrick> bricks, const Key& content) {
+  openPage_ = pageBytes_.empty() ? 0 : static_cast<std::uint32_t>(pageBytes_.size() - 1);
+  pageUses_.clear();
+  for (const Leaf& leaf : grid.leaves) countUse(Stream::mask, &leaf.active, sizeof leaf.active, 0);
+  for (const ChosenBrick& brick : bricks) {
+    countUse(Stream::unit, brick.payload.data(), brick.payload.size(), meaningOf(brick));
+  }
+  std::erase_if(pageUses_, [&](const auto& use) { return use.second < pageBytes_[use.first] / kLeastUse; });
+  if (const auto equal = pagesOfGrids_.find(content); equal != pagesOfGrids_.end()) {
+    for (const std::uint32_t page : equal->second) pageUses_[page] = pageBytes_[page];
+  }
+}
+
+// Of all that a grid frame's tree is made from.
+Sharer::Key Sharer::contentOf(const ImportedGrid& grid, std::span<const ChosenBrick> bricks) {
+  const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), &XXH3_freeState);
+  if (!state) throw std::bad_alloc();
+  XXH3_128bits_reset(state.get());
+  const auto add = [&](const auto& value) { XXH3_128bits_update(state.get(), &value, sizeof value); };
+  add(grid.background);
+  for (const Leaf& leaf : grid.leaves) {
+    add(leaf.origin);
+    add(leaf.active);
+  }
+  for (const ChosenBrick& brick : bricks) {
+    add(brick.encoding);
+    add(brick.texelMask);
+    add(brick.lo);
+    add(brick.scale);
+    XXH3_128bits_update(state.get(), brick.payload.data(), brick.payload.size());
+  }
+  for (const Tile& tile : grid.tiles) {
+    add(tile.origin);
+    add(tile.dim);
+    add(tile.value);
+  }
+  const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
+  return {hash.low64, hash.high64};
+}
+
 format::GridFrame Sharer::addGrid(const ImportedGrid& grid, const ChosenGrid& chosen, const std::string& where,
                                   std::vector<std::uint32_t>& pages) {
-  return TreeBuilder(*this, grid, chosen, where).build(pages);
+  const Key content = contentOf(grid, chosen.bricks);
+  beginGrid(grid, chosen.bricks, content);
+  const format::GridFrame frame = TreeBuilder(*this, grid, chosen, where).build(pages);
+  pagesOfGrids_[content] = pages;
+  return frame;
 }
 
 }  // namespace billow::compiler

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -47,14 +48,26 @@ class Sharer {
   friend class TreeBuilder;
 
   Key keyOf(format::Stream stream, const void* bytes, std::size_t size, std::uint32_t meaning) const;
-  // Index of equal content of the same `meaning` that is there already, or of the appended items.
+  // Index of equal content of the same `meaning` that lies where the grid frame reads anyway, or of the appended items.
   std::uint32_t intern(format::Stream stream, const void* items, std::uint32_t count, std::uint32_t meaning = 0);
+  // Null where the content is new.
+  const std::uint32_t* find(const Key& key) const;
+
+  // A grid frame begins: it reads the page that is open, those after it, and of older ones such of which it uses a good
+  // part, or which its equal reads. A few equal bytes in each of many pages would make it read them all.
+  void beginGrid(const ImportedGrid& grid, std::span<const ChosenBrick> bricks, const Key& content);
+  static Key contentOf(const ImportedGrid& grid, std::span<const ChosenBrick> bricks);
+  void countUse(format::Stream stream, const void* items, std::size_t bytes, std::uint32_t meaning);
 
   format::PackWriter& writer_;
   // Two generations: what has not been met again for a generation is forgotten (and would be stored anew), so that
   // memory stays bounded however long the sequence is: about 60 bytes an entry.
   static constexpr std::size_t kGeneration = 1u << 20;
   std::unordered_map<Key, std::uint32_t, KeyHash> recent_, older_;
+  std::vector<std::uint32_t> pageBytes_;                       // that were appended, by page
+  std::uint32_t openPage_ = 0;                                 // when the grid frame began
+  std::unordered_map<std::uint32_t, std::uint32_t> pageUses_;  // bytes of older pages that it has as bricks and masks
+  std::unordered_map<Key, std::vector<std::uint32_t>, KeyHash> pagesOfGrids_;  // by content
 };
 
 }  // namespace billow::compiler
