@@ -117,7 +117,7 @@ Result<FrameIndices> frameIndices(const format::Pack& pack, const format::Volume
   for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
     if (numbers[slot] == format::kNone) continue;
     const format::GridFrame& gridFrame = pack.gridFrame(volume, frame, numbers[slot]);
-    if (isPresent(gridFrame)) indices[slot] = chooseIndex(gridFrame, options.index);
+    if (isPresent(gridFrame)) indices[slot] = options.means ? Index::flat : chooseIndex(gridFrame, options.index);
   }
   return indices;
 }
@@ -144,6 +144,7 @@ Result<LoadedFrame> readFrame(const Device& device, const format::Pack& pack, st
                             .frame = frame,
                             .grids = *grids,
                             .index = options.index,
+                            .means = options.means,
                             .bc7 = device.bc7,
                             .leastAtlasBricks = device.leastAtlasBricks,
                             .maxImageExtent3D = device.maxImageExtent3D};

@@ -45,16 +45,28 @@ class Load {
       items_.giveRoom(s, scratch_.take<PageItems::Run>(stored.size()));
     }
     for (const StoredPage& page : stored) {
-      const format::PageRecord& record = pack.pages()[page.number];
-      const std::span<std::byte> content = scratch_.take<std::byte>(record.rawSize);
       const bool verify = verifies(page.number);
-      if (const auto done = unpacker_.unpack(pack, page.number, page.bytes, verify, content); !done) {
-        return packError(done.error());
-      }
+      const auto content = contentOf(page, verify);
+      if (!content) return packError(content.error());
       if (verify) remember(page.number);
-      items_.add(record, page.number, content.data());
+      items_.add(pack.pages()[page.number], page.number, *content);
     }
     return {};
+  }
+
+  format::Result<const std::byte*> contentOf(const StoredPage& page, bool verify) {
+    const format::PageRecord& record = request_.pack->pages()[page.number];
+    // Nodes are read in place.
+    const bool aligned = reinterpret_cast<std::uintptr_t>(page.bytes.data()) % alignof(format::Node3) == 0;
+    if (record.codec == static_cast<std::uint32_t>(format::Codec::raw) && aligned) {
+      const auto sound = unpacker_.checkRaw(*request_.pack, page.number, page.bytes, verify);
+      if (!sound) return tl::unexpected(sound.error());
+      return page.bytes.data();
+    }
+    const std::span<std::byte> content = scratch_.take<std::byte>(record.rawSize);
+    const auto done = unpacker_.unpack(*request_.pack, page.number, page.bytes, verify, content);
+    if (!done) return tl::unexpected(done.error());
+    return content.data();
   }
 
   std::span<std::uint32_t> numbersOf(Stream stream) {

@@ -44,6 +44,7 @@ struct LoadRequest {
   std::span<std::atomic<std::uint32_t>> verified = {};
 };
 
+// Bytes that nothing changes while they are loaded. Pages stored raw are not copied where they lie at a multiple of 4.
 struct StoredPage {
   std::uint32_t number = 0;
   std::span<const std::byte> bytes;

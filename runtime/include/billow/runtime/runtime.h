@@ -104,6 +104,7 @@ GridChoice withVelocity(const format::Pack& pack, const format::VolumeRecord& vo
 struct UploadOptions {
   std::optional<GridChoice> grids = {};  // default: chooseGrids()
   Index index = Index::automatic;        // automatic: what format::gpuBytes chooses; dense is for measurements
+  bool means = false;                    // in place of the grids, their means of 8^3 voxels each, with a flat index
 };
 
 // Device bytes of a frame.
