@@ -1,9 +1,13 @@
-// The page codec beside zstd, on the pages of a pack: bytes, and MB/s of content on one thread (its processor time).
+// The page codec beside zstd and plain copies, on the pages of a pack: bytes, and MB/s of content on one thread (its
+// processor time). "literals" keeps zstd from coding them: what it does not find again stays as it is.
 // Usage: billow_page_bench PACK [benchmark options]
 #include <benchmark/benchmark.h>
+#define ZSTD_STATIC_LINKING_ONLY  // how literals are coded
 #include <zstd.h>
 
 #include <cstdio>
+#include <cstring>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -33,10 +37,34 @@ Corpus readPages(const std::string& path) {
   return corpus;
 }
 
-Bytes zstd(const Bytes& page, int level) {
+struct Setting {
+  const char* name;
+  int level;
+  bool codesLiterals;
+};
+constexpr Setting kSettings[] = {
+    {"zstd 1", 1, true},           {"zstd 3", 3, true},           {"zstd 9", 9, true},
+    {"zstd 19", 19, true},         {"zstd -1", -1, true},         {"zstd -5", -5, true},
+    {"zstd 3 literals", 3, false}, {"zstd 9 literals", 9, false}, {"zstd 19 literals", 19, false}};
+
+// What does not shrink stays as it is.
+Bytes zstd(const Bytes& page, const Setting& setting) {
+  const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(), &ZSTD_freeCCtx);
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, setting.level);
+  if (!setting.codesLiterals) {
+    ZSTD_CCtx_setParameter(context.get(), ZSTD_c_literalCompressionMode, ZSTD_lcm_uncompressed);
+  }
   Bytes stored(ZSTD_compressBound(page.size()));
-  stored.resize(ZSTD_compress(stored.data(), stored.size(), page.data(), page.size(), level));
-  return stored;
+  stored.resize(ZSTD_compress2(context.get(), stored.data(), stored.size(), page.data(), page.size()));
+  return stored.size() < page.size() ? stored : page;
+}
+
+void unpack(const Bytes& stored, Bytes& out) {
+  if (stored.size() == out.size()) {
+    std::memcpy(out.data(), stored.data(), out.size());
+  } else {
+    ZSTD_decompress(out.data(), out.size(), stored.data(), stored.size());
+  }
 }
 
 template <class Encode>
@@ -78,16 +106,19 @@ int main(int argc, char** argv) {
   const auto modelBack = [&](std::size_t i, const Bytes& stored, Bytes& out) {
     format::decodePage(corpus.records[i].streams, stored, out);
   };
-  const auto zstd3 = [&](std::size_t i) { return zstd(corpus.pages[i], 3); };
-  const auto zstd19 = [&](std::size_t i) { return zstd(corpus.pages[i], 19); };
-  const auto zstdBack = [](std::size_t, const Bytes& stored, Bytes& out) {
-    ZSTD_decompress(out.data(), out.size(), stored.data(), stored.size());
-  };
   benchmark::RegisterBenchmark("encode/model", [&](auto& state) { encode(state, corpus, model); });
-  benchmark::RegisterBenchmark("encode/zstd 3", [&](auto& state) { encode(state, corpus, zstd3); });
-  benchmark::RegisterBenchmark("encode/zstd 19", [&](auto& state) { encode(state, corpus, zstd19); });
   benchmark::RegisterBenchmark("decode/model", [&](auto& state) { decode(state, corpus, model, modelBack); });
-  benchmark::RegisterBenchmark("decode/zstd 3", [&](auto& state) { decode(state, corpus, zstd3, zstdBack); });
+  for (const Setting& setting : kSettings) {
+    const auto pack = [&corpus, &setting](std::size_t i) { return zstd(corpus.pages[i], setting); };
+    const auto unpackOne = [](std::size_t, const Bytes& stored, Bytes& out) { unpack(stored, out); };
+    benchmark::RegisterBenchmark((std::string("encode/") + setting.name).c_str(),
+                                 [&corpus, pack](auto& state) { encode(state, corpus, pack); });
+    benchmark::RegisterBenchmark((std::string("decode/") + setting.name).c_str(),
+                                 [&corpus, pack, unpackOne](auto& state) { decode(state, corpus, pack, unpackOne); });
+  }
+  const auto copy = [&](std::size_t i) { return corpus.pages[i]; };
+  const auto copyBack = [](std::size_t, const Bytes& stored, Bytes& out) { unpack(stored, out); };
+  benchmark::RegisterBenchmark("decode/none", [&](auto& state) { decode(state, corpus, copy, copyBack); });
   int rest = argc - 1;
   benchmark::Initialize(&rest, argv + 1);
   benchmark::RunSpecifiedBenchmarks();
