@@ -232,6 +232,9 @@ class Streamer {
   // was resident; attach() goes on with a Renderer of the new device. Between them update() advances time alone.
   virtual void detach() = 0;
   virtual Result<void> attach(Renderer& renderer) = 0;
+
+ protected:
+  static Device& deviceOf(Renderer& renderer);
 };
 
 }  // namespace billow::runtime

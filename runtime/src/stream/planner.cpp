@@ -1,0 +1,135 @@
+#include "planner.h"
+
+#include <algorithm>
+
+namespace billow::runtime {
+void Planner::pass(Snapshot& snapshot, std::vector<Change>& changes, std::vector<StreamError>& errors) {
+  ++passes_;
+  shrunk_ = shrunk_ || snapshot.gpuBudget < budget_;
+  budget_ = snapshot.gpuBudget;
+  takeNotices(snapshot, changes);
+  takeArrivals(snapshot.now, changes, errors);
+  markDrawn(snapshot);
+  findVelocity(snapshot);
+  detail_.choose(snapshot, clips_, transport_, passes_, changes);
+  gather(snapshot);
+  fit();
+  cancelUnwanted(snapshot.now);
+  makeRoom(snapshot, changes);
+  leaveBlocks(changes);
+  order(snapshot);
+  forceRoom(snapshot, changes);
+  count(snapshot.now);
+}
+
+void Planner::findVelocity(const Snapshot& snapshot) {
+  for (const InstanceView& instance : snapshot.instances) {
+    PlannedClip& clip = clips_[instance.clip];
+    if (clip.clip == nullptr || !clip.clip->velocity) continue;
+    if (instance.playback.interpolation == Interpolation::advect) clip.velocity = true;
+  }
+}
+
+void Planner::fit() {
+  std::uint64_t sum = 0;
+  bool full = false;
+  for (Want& want : wants_) {
+    const std::uint64_t bytes = bytesOf(transport_, clips_[want.clip], want.item);
+    // What comes later may not take the room of what comes sooner and is larger.
+    if (full && want.tier >= kSoon) continue;
+    want.fits = bytes <= budget_ - std::min(sum, budget_);
+    if (want.fits) sum += bytes;
+    full = full || !want.fits;
+  }
+}
+
+bool Planner::absent(const Want& want, double now) const {
+  const PlannedClip& clip = clips_[want.clip];
+  const Item& item = clip.items[want.item];
+  if (item.ticket != 0 || item.leaving || item.corrupt || item.retryAt > now) return false;
+  return !item.resident || (clip.velocity && !item.velocity);
+}
+
+std::uint64_t Planner::bytesToLoad(const Want& want) {
+  PlannedClip& clip = clips_[want.clip];
+  if (!clip.items[want.item].resident) return bytesOf(transport_, clip, want.item);
+  return transport_.cost(clip.clip->order(want.item, clip.velocity)).gpu;
+}
+
+void Planner::order(const Snapshot& snapshot) {
+  bool blocked = false;
+  for (const Want& want : wants_) {
+    if (lost_ || loads_.size() >= kMostLoads) break;
+    if (!want.fits || !absent(want, snapshot.now)) continue;
+    const std::uint64_t bytes = bytesToLoad(want);
+    const std::uint64_t taken = resident_ + loading_;
+    if (bytes > budget_ - std::min(taken, budget_)) {
+      blocked = want.tier <= kNow;
+      break;
+    }
+    if (!submit(want, bytes, snapshot.now)) break;
+  }
+  if (!blocked) blockedFrom_.reset();
+  if (blocked && !blockedFrom_) blockedFrom_ = snapshot.update;
+}
+
+bool Planner::submit(const Want& want, std::uint64_t bytes, double now) {
+  PlannedClip& clip = clips_[want.clip];
+  Item& item = clip.items[want.item];
+  LoadOrder order = clip.clip->order(want.item, clip.velocity);
+  order.ticket = nextTicket_;
+  item.scratch = !transport_.submit(order);
+  if (item.scratch) return false;
+  item.ticket = nextTicket_++;
+  loading_ += bytes;
+  loads_.push_back({.ticket = item.ticket,
+                    .clip = want.clip,
+                    .item = want.item,
+                    .since = now,
+                    .bytes = bytes,
+                    .velocity = clip.velocity});
+  return true;
+}
+
+Missing Planner::whyMissing(const Want& want, double now) const {
+  const Item& item = clips_[want.clip].items[want.item];
+  if (item.corrupt || item.retryAt > now) return Missing::failed;
+  if (!want.fits || item.leaving) return Missing::gpuBudget;
+  if (item.ticket == 0) {
+    if (item.scratch) return Missing::cpuBudget;
+    return blockedFrom_ ? Missing::gpuBudget : Missing::queued;
+  }
+  switch (transport_.stage(item.ticket).value_or(LoadStage::uploading)) {
+    case LoadStage::reading:
+      return Missing::reading;
+    case LoadStage::decoding:
+      return Missing::decoding;
+    case LoadStage::waitingForMemory:
+      return Missing::gpuBudget;
+    case LoadStage::uploading:
+      return Missing::uploading;
+  }
+  return Missing::queued;
+}
+
+void Planner::count(double now) {
+  stats_.gpuBytes = resident_ + loading_ + asked_;
+  stats_.framesResident = static_cast<std::uint32_t>(residents_.size());
+  stats_.loadsQueued = stats_.loadsReading = stats_.loadsDecoding = stats_.loadsUploading = 0;
+  stats_.missingBricks = {};
+  for (const Load& load : loads_) {
+    const LoadStage stage = transport_.stage(load.ticket).value_or(LoadStage::uploading);
+    if (stage == LoadStage::reading) ++stats_.loadsReading;
+    if (stage == LoadStage::decoding) ++stats_.loadsDecoding;
+    if (stage == LoadStage::waitingForMemory || stage == LoadStage::uploading) ++stats_.loadsUploading;
+  }
+  for (const Want& want : wants_) {
+    const Item& item = clips_[want.clip].items[want.item];
+    if (want.fits && absent(want, now)) ++stats_.loadsQueued;
+    if (want.tier != kNow || item.resident) continue;
+    const auto why = static_cast<std::size_t>(whyMissing(want, now));
+    stats_.missingBricks[why] += clips_[want.clip].clip->bricks(want.item);
+  }
+}
+
+}  // namespace billow::runtime

@@ -1,0 +1,136 @@
+// Planning: which frames are loaded, at what level of detail, and which are given up for them. Knows neither threads
+// nor Vulkan; one pass at a time turns a snapshot of the instances into orders to the transport and changes for the
+// frame thread, and costs about as much as there are instances and frames that they want.
+//
+// A pass, in its order:
+//   1. notices of the frame thread and arrivals from the transport change what is resident;
+//   2. instances are ranked by their size in the picture, and each gets the finest level that makes sense there and
+//      fits into the budget beside the more important ones;
+//   3. what each wants now and soon is gathered into one list, the most urgent first;
+//   4. loads that nobody wants any more are cancelled, frames that are needed latest are evicted, as far as room is
+//      needed, and what is missing is ordered.
+#ifndef BILLOW_RUNTIME_STREAM_PLANNER_H
+#define BILLOW_RUNTIME_STREAM_PLANNER_H
+
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "detail.h"
+#include "exchange.h"
+
+namespace billow::runtime {
+
+// Loads in flight: enough to keep a disk or network with latency busy, few enough that what becomes urgent does not
+// wait for long.
+inline constexpr std::size_t kMostLoads = 16;
+
+class Planner {
+ public:
+  Planner(Transport& transport, const StreamConfig& config) : transport_(transport), config_(config) {}
+
+  void pass(Snapshot& snapshot, std::vector<Change>& changes, std::vector<StreamError>& errors);
+  const PlanStats& stats() const { return stats_; }
+  // The device is lost: nothing more is ordered.
+  bool lost() const { return lost_; }
+
+ private:
+  using Item = PlannedItem;
+  enum Tier : std::uint32_t {
+    kQuick,  // means of what is drawn now and has nothing resident
+    kNow,
+    kSoon,
+    kLate,  // would arrive when it is no longer needed, by what loads took of late
+  };
+  struct Want {
+    std::uint32_t clip, item;
+    std::uint32_t tier;
+    double seconds;  // until it is needed
+    double importance;
+    bool fits;
+  };
+  struct Load {
+    std::uint64_t ticket;
+    std::uint32_t clip, item;
+    double since;
+    std::uint64_t bytes;  // at most, on the device
+    bool velocity;
+  };
+  struct Leaving {
+    std::uint64_t update;
+    std::uint64_t bytes;
+  };
+  struct Resident {
+    std::uint32_t clip, item;
+  };
+  struct Victim {
+    std::uint32_t clip, item;
+    double score;  // the higher the sooner
+  };
+
+  // planner_residency.cpp: what is resident
+  void takeNotices(Snapshot& snapshot, std::vector<Change>& changes);
+  void takeArrivals(double now, std::vector<Change>& changes, std::vector<StreamError>& errors);
+  void arrived(const Load& load, Arrival& arrival, std::vector<Change>& changes);
+  void failed(const Load& load, const Arrival& arrival, double now, std::vector<Change>& changes,
+              std::vector<StreamError>& errors);
+  void closeClip(std::uint32_t clip);
+  void setResident(std::uint32_t clip, std::uint32_t item, const ResidentFrame& frame);
+  void setAbsent(std::uint32_t clip, std::uint32_t item);
+  std::uint64_t leavingBytes() const;
+
+  // planner_wants.cpp: what is wanted
+  void gather(const Snapshot& snapshot);
+  void gatherNow(const InstanceView& instance, std::uint32_t clip, double phase, double importance,
+                 std::uint32_t level);
+  void gatherComing(const InstanceView& instance, double importance, std::uint32_t level);
+  void want(std::uint32_t clip, std::uint32_t frame, std::uint32_t level, Tier tier, double seconds, double importance);
+  bool anyLevel(const PlannedClip& clip, std::uint32_t frame) const;
+  void markDrawn(const Snapshot& snapshot);
+
+  // planner_room.cpp: what is given up
+  void cancelUnwanted(double now);
+  void makeRoom(const Snapshot& snapshot, std::vector<Change>& changes);
+  std::uint64_t roomNeeded(double now);
+  void findVictims(const Snapshot& snapshot);
+  void forceRoom(const Snapshot& snapshot, std::vector<Change>& changes);
+  void leaveBlocks(std::vector<Change>& changes);
+  void evict(std::uint32_t clip, std::uint32_t item, Change::Kind kind, std::vector<Change>& changes);
+
+  // planner.cpp: what is ordered
+  void findVelocity(const Snapshot& snapshot);
+  void fit();
+  bool absent(const Want& want, double now) const;
+  std::uint64_t bytesToLoad(const Want& want);
+  void order(const Snapshot& snapshot);
+  bool submit(const Want& want, std::uint64_t bytes, double now);
+  void count(double now);
+  Missing whyMissing(const Want& want, double now) const;
+
+  Transport& transport_;
+  StreamConfig config_;
+  std::vector<PlannedClip> clips_;
+  Detail detail_;
+  std::vector<Want> wants_;
+  std::vector<Load> loads_;
+  std::vector<Resident> residents_;
+  std::vector<Victim> victims_;
+  std::vector<Leaving> leaving_;  // retired; the device may still read them
+  std::vector<Arrival> arrivals_;
+  std::set<std::pair<std::uint32_t, std::uint32_t>> toldPages_;  // of assets: errors that the host knows
+  std::uint64_t passes_ = 0;
+  std::uint64_t nextTicket_ = 1;
+  std::uint64_t budget_ = 0;
+  bool shrunk_ = false;  // the budget did, and frames may lie in memory that must go
+  std::uint64_t resident_ = 0;  // bytes, without what the frame thread was asked to give back
+  std::uint64_t asked_ = 0;     // bytes of that
+  std::uint64_t loading_ = 0;
+  double latency_ = 0;                        // seconds from order to arrival, of late
+  std::optional<std::uint64_t> blockedFrom_;  // the update since which something of now has no room
+  bool lost_ = false;
+  PlanStats stats_;
+};
+
+}  // namespace billow::runtime
+
+#endif  // BILLOW_RUNTIME_STREAM_PLANNER_H

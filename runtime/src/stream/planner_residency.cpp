@@ -1,0 +1,167 @@
+#include <algorithm>
+#include <utility>
+
+#include "planner.h"
+
+namespace billow::runtime {
+namespace {
+
+constexpr float kFirstBackOff = 0.25f;  // seconds; doubled up to
+constexpr float kLongestBackOff = 8;
+
+// Whether reading again may help: the bytes did not come, or memory was short. Bytes that break a rule stay as they
+// are.
+bool passing(const Error& error) {
+  if (error.code != ErrorCode::pack) return true;
+  return error.issue && error.issue->kind != nullptr && error.issue->kind->name == "cannot-read";
+}
+
+}  // namespace
+
+void Planner::setResident(std::uint32_t clip, std::uint32_t number, const ResidentFrame& frame) {
+  Item& item = clips_[clip].items[number];
+  item.frame = &frame;
+  item.bytes = std::max<std::uint64_t>(frame.stats().allocatedBytes, 1);
+  item.resident = true;
+  item.place = static_cast<std::uint32_t>(residents_.size());
+  residents_.push_back({clip, number});
+  resident_ += item.bytes;
+}
+
+// Of what is resident and was not asked back, or was: the sum that it is counted in shrinks.
+void Planner::setAbsent(std::uint32_t clip, std::uint32_t number) {
+  Item& item = clips_[clip].items[number];
+  (item.leaving ? asked_ : resident_) -= item.bytes;
+  const Resident moved = residents_.back();
+  residents_[item.place] = moved;
+  clips_[moved.clip].items[moved.item].place = item.place;
+  residents_.pop_back();
+  item.resident = item.leaving = item.velocity = false;
+  item.bytes = 0;
+  item.frame = nullptr;
+}
+
+std::uint64_t Planner::leavingBytes() const {
+  std::uint64_t sum = asked_;
+  for (const Leaving& leaving : leaving_) sum += leaving.bytes;
+  return sum;
+}
+
+void Planner::takeNotices(Snapshot& snapshot, std::vector<Change>& changes) {
+  std::erase_if(leaving_,
+                [&](const Leaving& frame) { return frame.update + config_.framesInFlight < snapshot.update; });
+  for (Notice& notice : snapshot.notices) {
+    if (notice.clip >= clips_.size()) clips_.resize(notice.clip + 1);
+    PlannedClip& clip = clips_[notice.clip];
+    if (notice.kind == Notice::Kind::opened) {
+      clip = {};
+      clip.items.resize(notice.opened->items());
+      clip.clip = std::move(notice.opened);
+      continue;
+    }
+    if (clip.clip == nullptr) continue;
+    if (notice.kind == Notice::Kind::closed) {
+      closeClip(notice.clip);
+      changes.push_back({.kind = Change::Kind::closed, .clip = notice.clip, .item = 0, .instance = {}, .frame = {}});
+      continue;
+    }
+    Item& item = clip.items[notice.item];
+    if (!item.leaving) continue;
+    if (notice.kind == Notice::Kind::retired) {
+      leaving_.push_back({snapshot.update, item.bytes});
+      setAbsent(notice.clip, notice.item);
+    } else {
+      item.leaving = false;
+      asked_ -= item.bytes;
+      resident_ += item.bytes;
+    }
+  }
+  snapshot.notices.clear();
+}
+
+void Planner::closeClip(std::uint32_t number) {
+  PlannedClip& clip = clips_[number];
+  for (std::uint32_t item = 0; item < clip.items.size(); ++item) {
+    if (clip.items[item].resident) setAbsent(number, item);
+  }
+  std::erase_if(loads_, [&](const Load& load) {
+    if (load.clip != number) return false;
+    transport_.cancel(load.ticket);
+    loading_ -= load.bytes;
+    return true;
+  });
+  const std::uint32_t asset = clip.clip->asset.value;
+  toldPages_.erase(toldPages_.lower_bound({asset, 0}), toldPages_.upper_bound({asset, format::kNone}));
+  clip = {};
+}
+
+void Planner::takeArrivals(double now, std::vector<Change>& changes, std::vector<StreamError>& errors) {
+  arrivals_.clear();
+  transport_.take(arrivals_);
+  for (Arrival& arrival : arrivals_) {
+    const auto found =
+        std::find_if(loads_.begin(), loads_.end(), [&](const Load& load) { return load.ticket == arrival.ticket; });
+    if (found == loads_.end()) {
+      // It was cancelled when it had all but arrived.
+      if (arrival.frame) changes.push_back({.kind = Change::Kind::discard, .frame = std::move(*arrival.frame)});
+      continue;
+    }
+    const Load load = *found;
+    *found = loads_.back();
+    loads_.pop_back();
+    loading_ -= load.bytes;
+    clips_[load.clip].items[load.item].ticket = 0;
+    latency_ += 0.25 * (now - load.since - latency_);
+    if (arrival.frame) {
+      arrived(load, arrival, changes);
+    } else {
+      failed(load, arrival, now, changes, errors);
+    }
+  }
+}
+
+void Planner::arrived(const Load& load, Arrival& arrival, std::vector<Change>& changes) {
+  Item& item = clips_[load.clip].items[load.item];
+  if (item.resident) setAbsent(load.clip, load.item);
+  setResident(load.clip, load.item, **arrival.frame);
+  item.velocity = load.velocity;
+  item.backOff = 0;
+  ++stats_.framesLoaded;
+  changes.push_back({.kind = Change::Kind::arrive,
+                     .clip = load.clip,
+                     .item = load.item,
+                     .instance = {},
+                     .frame = std::move(*arrival.frame)});
+}
+
+void Planner::failed(const Load& load, const Arrival& arrival, double now, std::vector<Change>& changes,
+                     std::vector<StreamError>& errors) {
+  PlannedClip& planned = clips_[load.clip];
+  const Clip& clip = *planned.clip;
+  Item& item = planned.items[load.item];
+  const Error& error = arrival.frame.error();
+  const bool first = item.backOff == 0;
+  if (error.code == ErrorCode::vulkan) {
+    if (std::exchange(lost_, true)) return;
+  } else if (passing(error)) {
+    item.backOff = first ? kFirstBackOff : std::min(2 * item.backOff, kLongestBackOff);
+    item.retryAt = now + static_cast<double>(item.backOff);
+  } else {
+    item.corrupt = true;
+    changes.push_back({.kind = Change::Kind::fail, .clip = load.clip, .item = load.item});
+  }
+  if (!first) return;
+  if (arrival.page) {
+    if (!toldPages_.insert({clip.asset.value, *arrival.page}).second) return;
+  }
+  errors.push_back({.code = error.code,
+                    .asset = clip.asset,
+                    .volume = clip.volume,
+                    .frame = clip.frameOf(load.item),
+                    .page = arrival.page,
+                    .message = "frame " + std::to_string(clip.frameOf(load.item)) + " of volume " +
+                               std::to_string(clip.volume) + ": " + error.message +
+                               (item.corrupt ? "; all else plays on" : "; it will be tried again")});
+}
+
+}  // namespace billow::runtime

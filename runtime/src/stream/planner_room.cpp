@@ -1,0 +1,129 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "next_use.h"
+#include "planner.h"
+
+namespace billow::runtime {
+namespace {
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr double kMeansWeigh = 16;         // small, and the first help after a seek: kept as if needed so much sooner
+constexpr std::uint64_t kPatience = 4;     // updates that something of now waits for room before a drawn frame goes
+constexpr std::uint64_t kNoPatience = 60;  // and before the last frame of an instance goes for a smaller budget
+
+}  // namespace
+
+void Planner::cancelUnwanted(double now) {
+  std::erase_if(loads_, [&](const Load& load) {
+    Item& item = clips_[load.clip].items[load.item];
+    if (item.wanted == passes_ && wants_[item.want].fits) return false;
+    // What has been read is worth the rest.
+    const auto stage = transport_.stage(load.ticket);
+    if (stage == LoadStage::decoding || stage == LoadStage::uploading) return false;
+    if (stage == LoadStage::waitingForMemory && resident_ + loading_ <= budget_) return false;
+    transport_.cancel(load.ticket);
+    latency_ = std::max(latency_, now - load.since);
+    loading_ -= load.bytes;
+    item.ticket = 0;
+    return true;
+  });
+}
+
+std::uint64_t Planner::roomNeeded(double now) {
+  std::uint64_t bytes = resident_ + loading_;
+  std::size_t slots = kMostLoads > loads_.size() ? kMostLoads - loads_.size() : 0;
+  for (const Want& want : wants_) {
+    if (slots == 0) break;
+    if (!want.fits || !absent(want, now)) continue;
+    bytes += bytesToLoad(want);
+    --slots;
+  }
+  std::uint64_t needed = bytes > budget_ ? bytes - budget_ : 0;
+  // What the plan has room for may not find any between the frames that lie there.
+  const std::uint64_t stuck = transport_.wantedGpuBytes();
+  const std::uint64_t leaving = leavingBytes();
+  if (stuck > leaving) needed = std::max(needed, stuck - leaving);
+  return needed;
+}
+
+void Planner::findVictims(const Snapshot& snapshot) {
+  victims_.clear();
+  bool known = false;
+  for (const Resident& resident : residents_) {
+    PlannedClip& clip = clips_[resident.clip];
+    const Item& item = clip.items[resident.item];
+    if (item.leaving || item.drawn == passes_ || item.ticket != 0) continue;
+    if (item.wanted == passes_ && wants_[item.want].fits) continue;
+    if (!known) findNextUses(snapshot, clips_, passes_);
+    known = true;
+    const double next = clip.usesKnown == passes_ ? clip.nextUse[clip.clip->frameOf(resident.item)] : kNever;
+    const bool means = clip.clip->levelOf(resident.item) + 1 == clip.clip->levelCount();
+    // What nobody plays towards goes first, the least recently used of it before the rest.
+    double score = next < kNever ? next : 1e12 + snapshot.now - item.used;
+    if (means) score /= kMeansWeigh;
+    victims_.push_back({resident.clip, resident.item, score});
+  }
+  std::sort(victims_.begin(), victims_.end(), [](const Victim& x, const Victim& y) {
+    if (x.score != y.score) return x.score > y.score;
+    return x.clip != y.clip ? x.clip < y.clip : x.item < y.item;
+  });
+}
+
+void Planner::makeRoom(const Snapshot& snapshot, std::vector<Change>& changes) {
+  const std::uint64_t needed = roomNeeded(snapshot.now);
+  if (needed == 0) return;
+  findVictims(snapshot);
+  std::uint64_t made = 0;
+  for (const Victim& victim : victims_) {
+    if (made >= needed) break;
+    made += clips_[victim.clip].items[victim.item].bytes;
+    evict(victim.clip, victim.item, Change::Kind::evict, changes);
+  }
+}
+
+// Memory goes back to the device in blocks: after the budget shrank, frames in those that go are loaded anew elsewhere.
+void Planner::leaveBlocks(std::vector<Change>& changes) {
+  if (!shrunk_) return;
+  shrunk_ = false;
+  for (const Resident& resident : residents_) {
+    const Item& item = clips_[resident.clip].items[resident.item];
+    if (item.leaving || item.ticket != 0 || !transport_.mustLeave(*item.frame)) continue;
+    shrunk_ = true;
+    evict(resident.clip, resident.item, Change::Kind::evict, changes);
+  }
+}
+
+void Planner::evict(std::uint32_t clip, std::uint32_t number, Change::Kind kind, std::vector<Change>& changes) {
+  Item& item = clips_[clip].items[number];
+  item.leaving = true;
+  resident_ -= item.bytes;
+  asked_ += item.bytes;
+  changes.push_back({.kind = kind, .clip = clip, .item = number, .instance = {}, .frame = {}});
+}
+
+// Drawn frames hold the room that others need: those go that no moment of now is made of, of the least important
+// instance first, and of each its last one only for a budget that became smaller.
+void Planner::forceRoom(const Snapshot& snapshot, std::vector<Change>& changes) {
+  const bool over = resident_ + loading_ > budget_;
+  if (over && !blockedFrom_) blockedFrom_ = snapshot.update;
+  if (!blockedFrom_ || snapshot.update < *blockedFrom_ + kPatience || asked_ > 0) return;
+  const bool last = over && snapshot.update >= *blockedFrom_ + kNoPatience;
+  const auto unwanted = [&](const Item& item) {
+    return item.resident && !item.leaving && item.ticket == 0 && !(item.wanted == passes_ && wants_[item.want].fits);
+  };
+  // Those without priority come after the ranked ones, and go first.
+  for (std::size_t i = snapshot.instances.size(); i-- > 0;) {
+    const auto& ranked = detail_.ranked();
+    const InstanceView& instance = i < ranked.size() ? snapshot.instances[ranked[i].instance] : snapshot.instances[i];
+    if (i >= ranked.size() && instance.priority > 0) continue;
+    PlannedClip& clip = clips_[instance.clip];
+    if (clip.clip == nullptr || instance.drawnCount < (last ? 1u : 2u)) continue;
+    const std::uint32_t item = instance.drawn[instance.drawnCount - 1];
+    if (!unwanted(clip.items[item])) continue;
+    return evict(instance.clip, item, Change::Kind::force, changes);
+  }
+}
+
+}  // namespace billow::runtime

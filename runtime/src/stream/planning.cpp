@@ -1,0 +1,120 @@
+#include "planning.h"
+
+#include <iterator>
+#include <utility>
+
+namespace billow::runtime {
+namespace {
+
+template <class T>
+void moveOver(std::vector<T>& from, std::vector<T>& to) {
+  to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
+  from.clear();
+}
+
+}  // namespace
+
+bool OpenJobs::begin() {
+  const std::lock_guard lock(mutex_);
+  if (!stopped_) ++running_;
+  return !stopped_;
+}
+
+void OpenJobs::end() {
+  const std::lock_guard lock(mutex_);
+  // Under the lock: the one who waits may destroy this as soon as it sees none.
+  if (--running_ == 0) ended_.notify_all();
+}
+
+void OpenJobs::stop() {
+  std::unique_lock lock(mutex_);
+  stopped_ = true;
+  ended_.wait(lock, [this] { return running_ == 0; });
+}
+
+void OpenJobs::start() {
+  const std::lock_guard lock(mutex_);
+  stopped_ = false;
+}
+
+void Planning::start(Transport& transport, const StreamConfig& config) {
+  planner_ = std::make_unique<Planner>(transport, config);
+  {
+    const std::lock_guard lock(turn_);
+    wanted_ = stopped_ = false;
+  }
+  if (on_ == PlanOn::thread) thread_ = std::thread(&Planning::work, this);
+}
+
+void Planning::stop() {
+  {
+    const std::lock_guard lock(turn_);
+    stopped_ = true;
+  }
+  asked_.notify_all();
+  if (thread_.joinable()) thread_.join();
+  const std::lock_guard lock(mutex_);
+  planner_.reset();
+  snapshot_ = pending_ = {};
+  began_ = false;
+  fresh_ = false;
+  changes_.clear();
+  errors_.clear();
+  stats_ = {};
+}
+
+void Planning::request() {
+  {
+    const std::lock_guard lock(turn_);
+    if (stopped_) return;
+    wanted_ = true;
+  }
+  if (on_ == PlanOn::request) return pass();
+  asked_.notify_one();
+}
+
+void Planning::work() {
+  for (;;) {
+    {
+      std::unique_lock lock(turn_);
+      asked_.wait(lock, [this] { return wanted_ || stopped_; });
+      if (stopped_) return;
+      wanted_ = false;
+    }
+    pass();
+  }
+}
+
+void Planning::pass() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (fresh_.load(std::memory_order_relaxed)) {
+      std::swap(snapshot_, pending_);
+      fresh_.store(false, std::memory_order_release);
+      began_ = true;
+    }
+  }
+  if (!began_) return;
+  planner_->pass(snapshot_, made_, met_);
+  const std::lock_guard lock(mutex_);
+  moveOver(made_, changes_);
+  moveOver(met_, errors_);
+  stats_ = planner_->stats();
+}
+
+void Planning::take(std::vector<Change>& changes, std::vector<StreamError>& errors, PlanStats& stats) {
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  if (!lock) return;
+  changes.swap(changes_);
+  errors.swap(errors_);
+  stats = stats_;
+}
+
+void Planning::publish(Snapshot& snapshot) {
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  if (!lock) return;
+  std::swap(snapshot, pending_);
+  fresh_.store(true, std::memory_order_release);
+}
+
+}  // namespace billow::runtime

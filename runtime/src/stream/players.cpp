@@ -1,0 +1,350 @@
+#include "players.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "api.h"
+
+namespace billow::runtime {
+namespace {
+
+constexpr std::uint32_t kMostGenerations = (1u << (32 - kHandleSlotBits)) - 1;
+
+double lengthOfColumn(const std::array<double, 12>& m, std::size_t column) {
+  return std::sqrt(m[column] * m[column] + m[4 + column] * m[4 + column] + m[8 + column] * m[8 + column]);
+}
+
+bool sane(const InstanceInfo& info) {
+  const bool transform =
+      std::all_of(info.objectToWorld.begin(), info.objectToWorld.end(), [](double x) { return std::isfinite(x); });
+  return transform && std::isfinite(info.time) && std::isfinite(info.playback.speed) && std::isfinite(info.priority) &&
+         info.priority >= 0;
+}
+
+}  // namespace
+
+std::uint32_t Players::openClip(std::shared_ptr<const Clip> clip) {
+  std::uint32_t number = static_cast<std::uint32_t>(tracks_.size());
+  if (freeTracks_.empty()) {
+    tracks_.emplace_back();
+  } else {
+    number = freeTracks_.back();
+    freeTracks_.pop_back();
+  }
+  tracks_[number].slots = std::vector<Track::Slot>(clip->items());
+  notices_.push_back({.kind = Notice::Kind::opened, .clip = number, .item = 0, .opened = clip});
+  tracks_[number].clip = std::move(clip);
+  return number;
+}
+
+// Frames stay until planning, which may be looking at them, says that it knows.
+void Players::closeClip(std::uint32_t number) {
+  tracks_[number].clip.reset();
+  std::erase_if(asked_, [&](const auto& asked) { return asked.first == number; });
+  notices_.push_back({.kind = Notice::Kind::closed, .clip = number, .item = 0, .opened = {}});
+}
+
+std::uint32_t Players::indexOf(InstanceId id) const {
+  const std::uint32_t slot = id.value & kHandleSlotMask;
+  if (slot >= handles_.size() || handles_[slot].generation != id.value >> kHandleSlotBits) return format::kNone;
+  return handles_[slot].index;
+}
+
+InstanceView* Players::find(InstanceId id) {
+  const std::uint32_t index = indexOf(id);
+  return index == format::kNone ? nullptr : &views_[index];
+}
+
+Result<InstanceId> Players::add(const InstanceInfo& info, std::uint32_t clip) {
+  if (!sane(info)) return failure(ErrorCode::argument, "InstanceInfo: a number is outside of its range");
+  if (freeHandles_.empty()) {
+    if (handles_.size() > kHandleSlotMask) return failure(ErrorCode::argument, "there are too many instances");
+    freeHandles_.push_back(static_cast<std::uint32_t>(handles_.size()));
+    handles_.emplace_back();
+  }
+  const std::uint32_t slot = freeHandles_.back();
+  freeHandles_.pop_back();
+  handles_[slot].index = static_cast<std::uint32_t>(views_.size());
+  InstanceView view;
+  view.id.value = handles_[slot].generation << kHandleSlotBits | slot;
+  view.clip = clip;
+  view.playback = info.playback;
+  view.priority = info.priority;
+  view.phase = wrapPhase(tracks_[clip].clip->timeline, info.playback.loop, info.time);
+  views_.push_back(view);
+  players_.emplace_back();
+  shown_.emplace_back();
+  transforms_.push_back(info.objectToWorld);
+  place(static_cast<std::uint32_t>(views_.size()) - 1);
+  return view.id;
+}
+
+void Players::removeAt(std::uint32_t index) {
+  Handle& handle = handles_[views_[index].id.value & kHandleSlotMask];
+  handle.index = format::kNone;
+  const std::uint32_t slot = views_[index].id.value & kHandleSlotMask;
+  // A slot that has no number left is never used again.
+  if (++handle.generation <= kMostGenerations) freeHandles_.push_back(slot);
+  const std::size_t last = views_.size() - 1;
+  if (index != last) {
+    views_[index] = views_[last];
+    players_[index] = players_[last];
+    shown_[index] = shown_[last];
+    transforms_[index] = transforms_[last];
+    handles_[views_[index].id.value & kHandleSlotMask].index = index;
+  }
+  views_.pop_back();
+  players_.pop_back();
+  shown_.pop_back();
+  transforms_.pop_back();
+}
+
+void Players::remove(InstanceId id) {
+  const std::uint32_t index = indexOf(id);
+  if (index != format::kNone) removeAt(index);
+}
+
+void Players::removeOf(AssetId asset) {
+  for (std::uint32_t i = static_cast<std::uint32_t>(views_.size()); i-- > 0;) {
+    if (tracks_[views_[i].clip].clip->asset == asset) removeAt(i);
+  }
+}
+
+void Players::place(std::uint32_t index) {
+  InstanceView& view = views_[index];
+  const std::array<double, 12>& m = transforms_[index];
+  const Clip& clip = *tracks_[view.clip].clip;
+  for (std::size_t row = 0; row < 3; ++row) {
+    view.centre[row] = m[4 * row + 3];
+    for (std::size_t column = 0; column < 3; ++column) view.centre[row] += m[4 * row + column] * clip.centre[column];
+  }
+  view.scale = std::max({lengthOfColumn(m, 0), lengthOfColumn(m, 1), lengthOfColumn(m, 2)});
+  view.radius = clip.radius * view.scale;
+}
+
+void Players::setTransform(InstanceId id, const std::array<double, 12>& objectToWorld) {
+  const std::uint32_t index = indexOf(id);
+  if (index == format::kNone) return;
+  transforms_[index] = objectToWorld;
+  place(index);
+}
+
+void Players::setPlayback(InstanceId id, const Playback& playback) {
+  const std::uint32_t index = indexOf(id);
+  if (index == format::kNone || !std::isfinite(playback.speed)) return;
+  InstanceView& view = views_[index];
+  const Timeline& timeline = tracks_[view.clip].clip->timeline;
+  const double time = momentAt(timeline, view.playback.loop, view.phase, 0).time;
+  if (playback.loop != view.playback.loop) view.phase = phaseAt(timeline, playback.loop, time, 0);
+  // What it passed lies on the other side then.
+  if (playback.loop != view.playback.loop || (playback.speed < 0) != (view.playback.speed < 0)) {
+    players_[index].passed = 0;
+  }
+  view.playback = playback;
+}
+
+void Players::seek(InstanceId id, double time) {
+  const std::uint32_t index = indexOf(id);
+  if (index == format::kNone || !std::isfinite(time)) return;
+  InstanceView& view = views_[index];
+  view.phase = phaseAt(tracks_[view.clip].clip->timeline, view.playback.loop, time, view.phase);
+  players_[index].passed = 0;
+}
+
+Drawable Players::drawable(InstanceId id) const {
+  Drawable drawable;
+  const std::uint32_t index = indexOf(id);
+  if (index == format::kNone) return drawable;
+  const Shown& shown = shown_[index];
+  const Track& track = tracks_[views_[index].clip];
+  drawable.count = shown.count;
+  for (std::uint32_t i = 0; i < shown.count; ++i) {
+    drawable.layers[i] = {
+        .frame = track.slots[shown.items[i]].frame.get(), .weight = shown.weights[i], .advect = shown.advect[i]};
+  }
+  drawable.time = shown.time;
+  drawable.held = shown.held && shown.count > 0;
+  drawable.coarse = shown.coarse;
+  return drawable;
+}
+
+void Players::setSuccessors(AssetId asset, std::span<const std::uint32_t> clips) {
+  for (InstanceView& view : views_) {
+    const Clip& clip = *tracks_[view.clip].clip;
+    if (clip.asset == asset) view.successor = clip.volume < clips.size() ? clips[clip.volume] : format::kNone;
+  }
+}
+
+namespace {
+
+// Calls visit(track, frame) for what the instance needs now of its successor, until it gives false.
+template <class Visit>
+bool visitSuccessor(const std::vector<Track>& tracks, const InstanceView& view, const Visit& visit) {
+  const Track& track = tracks[view.successor];
+  const double phase = successorPhase(*tracks[view.clip].clip, *track.clip, view);
+  const Moment moment = momentAt(track.clip->timeline, view.playback.loop, phase, 0);
+  if (!visit(track, track.clip->same[moment.a])) return false;
+  if (view.playback.interpolation == Interpolation::hold || moment.fraction <= 0) return true;
+  return visit(track, track.clip->same[moment.b]);
+}
+
+bool residentOrFailed(const Track& track, std::uint32_t frame) {
+  const std::uint32_t levels = track.clip->levelCount();
+  bool allFailed = true;
+  for (std::uint32_t level = 0; level < levels; ++level) {
+    const Track::Slot& slot = track.slots[std::size_t{frame} * levels + level];
+    if (slot.frame != nullptr) return true;
+    allFailed = allFailed && slot.failed;
+  }
+  return allFailed;
+}
+
+bool allFailed(const Track& track, std::uint32_t frame) {
+  const std::uint32_t levels = track.clip->levelCount();
+  for (std::uint32_t level = 0; level < levels; ++level) {
+    if (!track.slots[std::size_t{frame} * levels + level].failed) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+bool Players::succeed(AssetId asset) {
+  for (const InstanceView& view : views_) {
+    if (tracks_[view.clip].clip->asset != asset || view.successor == format::kNone || !(view.priority > 0)) continue;
+    if (!visitSuccessor(tracks_, view, residentOrFailed)) return false;
+  }
+  for (std::uint32_t i = 0; i < views_.size(); ++i) {
+    InstanceView& view = views_[i];
+    if (tracks_[view.clip].clip->asset != asset || view.successor == format::kNone) continue;
+    view.phase = successorPhase(*tracks_[view.clip].clip, *tracks_[view.successor].clip, view);
+    view.clip = std::exchange(view.successor, format::kNone);
+    view.drawnCount = 0;
+    players_[i] = {.fades = {}, .passed = 0, .near = 0, .level = players_[i].level};
+    shown_[i] = {};
+    place(i);
+  }
+  return true;
+}
+
+bool Players::successorFailed(AssetId asset) const {
+  return std::any_of(views_.begin(), views_.end(), [&](const InstanceView& view) {
+    if (tracks_[view.clip].clip->asset != asset || view.successor == format::kNone) return false;
+    return !visitSuccessor(tracks_, view,
+                           [](const Track& track, std::uint32_t frame) { return !allFailed(track, frame); });
+  });
+}
+
+void Players::retire(std::unique_ptr<ResidentFrame> frame, Transport& transport) {
+  ++retired_.frames;
+  retired_.bytes += frame->stats().allocatedBytes;
+  transport.retire(std::move(frame));
+}
+
+void Players::take(std::span<Change> changes, Transport& transport) {
+  for (Change& change : changes) {
+    if (change.kind == Change::Kind::discard) {
+      transport.retire(std::move(change.frame));
+      continue;
+    }
+    if (change.kind == Change::Kind::level) {
+      const std::uint32_t index = indexOf(change.instance);
+      if (index != format::kNone) players_[index].level = static_cast<std::uint8_t>(change.item);
+      continue;
+    }
+    Track& track = tracks_[change.clip];
+    if (change.kind == Change::Kind::closed) {
+      for (Track::Slot& slot : track.slots) {
+        if (slot.frame != nullptr) retire(std::move(slot.frame), transport);
+      }
+      track.slots.clear();
+      freeTracks_.push_back(change.clip);
+      continue;
+    }
+    if (track.clip == nullptr || change.item >= track.slots.size()) {
+      if (change.frame != nullptr) transport.retire(std::move(change.frame));
+      continue;
+    }
+    Track::Slot& slot = track.slots[change.item];
+    switch (change.kind) {
+      case Change::Kind::arrive:
+        if (slot.frame != nullptr) retire(std::move(slot.frame), transport);
+        slot.frame = std::move(change.frame);
+        break;
+      case Change::Kind::force:
+        if (slot.frame == nullptr) break;
+        retire(std::move(slot.frame), transport);
+        notices_.push_back({.kind = Notice::Kind::retired, .clip = change.clip, .item = change.item, .opened = {}});
+        break;
+      case Change::Kind::evict:
+        asked_.emplace_back(change.clip, change.item);
+        break;
+      case Change::Kind::fail:
+        slot.failed = true;
+        break;
+      default:
+        break;
+    }
+  }
+}
+
+void Players::advance(double seconds, std::uint64_t update) {
+  count_ = {};
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    InstanceView& view = views_[i];
+    Track& track = tracks_[view.clip];
+    const double moved = view.playback.speed * seconds;
+    view.phase = wrapPhase(track.clip->timeline, view.playback.loop, view.phase + moved);
+    Shown& shown = shown_[i];
+    chooseLayers(track, view, players_[i], shown, moved, static_cast<float>(seconds), update);
+    view.drawn = shown.items;
+    view.drawnCount = shown.count;
+    view.held = shown.held;
+    if (!(view.priority > 0)) continue;
+    ++count_.all;
+    if (shown.count == 0) ++count_.empty;
+    if (shown.count > 0 && shown.held) ++count_.held;
+    if (shown.coarse) ++count_.coarse;
+  }
+}
+
+void Players::giveBack(Transport& transport, std::uint64_t update) {
+  for (const auto& [clip, item] : asked_) {
+    Track::Slot& slot = tracks_[clip].slots[item];
+    if (slot.frame == nullptr) continue;
+    const bool drawn = slot.drawn == update;
+    notices_.push_back(
+        {.kind = drawn ? Notice::Kind::refused : Notice::Kind::retired, .clip = clip, .item = item, .opened = {}});
+    if (!drawn) retire(std::move(slot.frame), transport);
+  }
+  asked_.clear();
+}
+
+void Players::fill(Snapshot& snapshot) {
+  snapshot.instances = views_;
+  snapshot.notices.swap(notices_);
+}
+
+void Players::dropFrames() {
+  notices_.clear();
+  asked_.clear();
+  freeTracks_.clear();
+  for (std::uint32_t number = 0; number < tracks_.size(); ++number) {
+    Track& track = tracks_[number];
+    if (track.clip == nullptr) {
+      track.slots.clear();
+      freeTracks_.push_back(number);
+      continue;
+    }
+    track.slots = std::vector<Track::Slot>(track.clip->items());
+    notices_.push_back({.kind = Notice::Kind::opened, .clip = number, .item = 0, .opened = track.clip});
+  }
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    shown_[i] = {};
+    players_[i] = {.fades = {}, .passed = 0, .near = 0, .level = players_[i].level};
+    views_[i].drawnCount = 0;
+  }
+}
+
+}  // namespace billow::runtime

@@ -1,0 +1,119 @@
+// The frame thread's part: instances, the frames that are resident, and what is drawn of them. Chooses among what is
+// there; what ought to be there is the planner's business.
+#ifndef BILLOW_RUNTIME_STREAM_PLAYERS_H
+#define BILLOW_RUNTIME_STREAM_PLAYERS_H
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "detail.h"
+#include "exchange.h"
+
+namespace billow::runtime {
+
+inline constexpr float kFadeSeconds = 0.2f;  // from a level of detail to another
+
+// The frames of a clip that are resident, by item.
+struct Track {
+  struct Slot {
+    std::unique_ptr<ResidentFrame> frame;
+    std::uint64_t drawn = 0;  // the update that drew it last
+    bool failed = false;
+  };
+  std::shared_ptr<const Clip> clip;  // null: closed
+  std::vector<Slot> slots;
+};
+
+// A frame that is drawn, on its way from one level to another.
+struct Fade {
+  std::uint32_t frame = format::kNone;
+  std::uint8_t from = 0, to = 0;
+  float progress = 1;
+};
+
+// What an instance remembers from update to update.
+struct Player {
+  Fade fades[2];
+  double passed = 0;  // volume seconds since something of the moment was drawn, or since a seek
+  std::uint32_t near = 0;
+  std::uint8_t level = 0;  // that planning chose
+};
+
+// Decides what `view` draws at its phase. `moved`: volume seconds since the last time; `seconds`: real ones.
+void chooseLayers(Track& track, const InstanceView& view, Player& player, Shown& shown, double moved, float seconds,
+                  std::uint64_t update);
+
+struct RetiredCount {
+  std::uint32_t frames = 0;
+  std::uint64_t bytes = 0;
+};
+
+// Of instances with priority.
+struct InstanceCount {
+  std::uint32_t all = 0, held = 0, coarse = 0, empty = 0;
+};
+
+class Players {
+ public:
+  std::uint32_t openClip(std::shared_ptr<const Clip> clip);
+  void closeClip(std::uint32_t clip);
+  const Track& track(std::uint32_t clip) const { return tracks_[clip]; }
+
+  Result<InstanceId> add(const InstanceInfo& info, std::uint32_t clip);
+  void remove(InstanceId id);
+  void removeOf(AssetId asset);
+  // Null where there is no such instance. What place() gives depends on transform and clip.
+  InstanceView* find(InstanceId id);
+  void setTransform(InstanceId id, const std::array<double, 12>& objectToWorld);
+  void setPlayback(InstanceId id, const Playback& playback);
+  void seek(InstanceId id, double time);
+  Drawable drawable(InstanceId id) const;
+  std::span<const InstanceView> views() const { return views_; }
+
+  // Clips of an asset get successors, by the volumes that instances play; or lose them again.
+  void setSuccessors(AssetId asset, std::span<const std::uint32_t> clips);
+  // Whether everything that is drawn now of the asset is resident of its successors; they then take their place.
+  bool succeed(AssetId asset);
+  bool successorFailed(AssetId asset) const;
+
+  // The parts of an update(), in this order.
+  void take(std::span<Change> changes, Transport& transport);
+  void advance(double seconds, std::uint64_t update);
+  void giveBack(Transport& transport, std::uint64_t update);
+  void fill(Snapshot& snapshot);
+
+  RetiredCount retired() const { return retired_; }  // since it was made
+  InstanceCount count() const { return count_; }     // at the last advance()
+  // Forgets every frame and notice; each clip is announced anew.
+  void dropFrames();
+
+ private:
+  struct Handle {
+    std::uint32_t generation = 1;
+    std::uint32_t index = format::kNone;
+  };
+  std::uint32_t indexOf(InstanceId id) const;
+  void place(std::uint32_t index);
+  void removeAt(std::uint32_t index);
+  void retire(std::unique_ptr<ResidentFrame> frame, Transport& transport);
+
+  std::vector<Track> tracks_;
+  std::vector<std::uint32_t> freeTracks_;  // closed, and planning knows
+  // Parallel, in no order.
+  std::vector<InstanceView> views_;
+  std::vector<Player> players_;
+  std::vector<Shown> shown_;
+  std::vector<std::array<double, 12>> transforms_;
+  std::vector<Handle> handles_;
+  std::vector<std::uint32_t> freeHandles_;
+  std::vector<Notice> notices_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> asked_;  // clip and item that planning asks back
+  RetiredCount retired_;
+  InstanceCount count_;
+};
+
+}  // namespace billow::runtime
+
+#endif  // BILLOW_RUNTIME_STREAM_PLAYERS_H

@@ -1,0 +1,491 @@
+#include "streamer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <map>
+#include <utility>
+
+#include "api.h"
+#include "checks.h"
+#include "opening.h"
+#include "planning.h"
+#include "players.h"
+
+namespace billow::runtime {
+namespace {
+
+constexpr std::size_t kMostErrors = 256;  // that the host has not taken yet; the newest are dropped
+
+struct Asset {
+  AssetId id = {};
+  Streamer::AssetState state = Streamer::AssetState::opening;
+  Opened opened;
+  std::vector<std::uint32_t> clips;  // by volume: numbers of Players, or kNone
+  // What is to take its place.
+  bool reloading = false;
+  bool told = false;  // of an error in it
+  std::optional<Opened> next;
+  std::vector<std::uint32_t> nextClips;
+};
+
+struct OpenDone {
+  AssetId asset = {};
+  bool reload = false;
+  Result<Opened> opened;
+};
+
+const char* badField(const StreamConfig& config) {
+  if (config.gpuBudget == 0) return "gpuBudget";
+  if (config.stagingBytes < (std::uint64_t{64} << 10) || config.stagingBytes > config.cpuBudget) return "stagingBytes";
+  if (config.threads == 0 && config.jobs.submit == nullptr) return "threads, jobs";
+  if ((config.allocator.allocate == nullptr) != (config.allocator.release == nullptr)) return "allocator";
+  if (!(config.prefetchSeconds >= 0) || config.prefetchSeconds > 60) return "prefetchSeconds";
+  return nullptr;
+}
+
+class StreamerImpl final : public Streamer {
+ public:
+  StreamerImpl(const StreamConfig& config, MakeTransport make, PlanOn on)
+      : config_(config), make_(std::move(make)), planning_(on) {}
+
+  ~StreamerImpl() override {
+    drop();
+    assets_.clear();
+  }
+
+  Result<void> connect(Device* device) {
+    auto transport = make_(device, config_, {.call = &wake, .user = this});
+    if (!transport) return tl::unexpected(transport.error());
+    std::uint64_t bytes = 0;
+    for (const auto& [id, asset] : assets_) {
+      bytes += asset.opened.bytes + (asset.next ? asset.next->bytes : 0);
+    }
+    if (!(*transport)->reserveCpu(bytes)) {
+      return failure(ErrorCode::budget, "the tables of the open packs do not fit into the CPU budget");
+    }
+    transport_ = std::move(*transport);
+    planning_.start(*transport_, config_);
+    before_ = transport_->stats();
+    jobs_.start();
+    return {};
+  }
+
+  Result<AssetId> open(const PackSource& source) override {
+    return guarded<AssetId>([&]() -> Result<AssetId> {
+      if (auto fits = checkSource(source); !fits) return tl::unexpected(fits.error());
+      const AssetId id{nextAsset_++};
+      auto opened =
+          source.source != nullptr ? openHere(source.source, id) : openFile(source.path, id, Reserve{*transport_});
+      if (!opened) return tl::unexpected(opened.error());
+      assets_[id.value].id = id;
+      begin(assets_[id.value], std::move(*opened));
+      log(LogLevel::information, "opened " + nameOf(source));
+      return id;
+    });
+  }
+
+  Result<AssetId> openLater(const PackSource& source) override {
+    return guarded<AssetId>([&]() -> Result<AssetId> {
+      if (auto fits = checkSource(source); !fits) return tl::unexpected(fits.error());
+      const AssetId id{nextAsset_++};
+      assets_[id.value].id = id;
+      startOpening(source, id, false);
+      return id;
+    });
+  }
+
+  AssetState state(AssetId asset) const override {
+    const auto found = assets_.find(asset.value);
+    return found == assets_.end() ? AssetState::unknown : found->second.state;
+  }
+
+  const format::Pack* pack(AssetId asset) const override {
+    const auto found = assets_.find(asset.value);
+    if (found == assets_.end() || found->second.state != AssetState::ready) return nullptr;
+    return &found->second.opened.pack->pack;
+  }
+
+  Result<void> reload(AssetId id, const PackSource& source) override {
+    return guarded<void>([&]() -> Result<void> {
+      if (auto fits = checkSource(source); !fits) return tl::unexpected(fits.error());
+      if (state(id) != AssetState::ready) return failure(ErrorCode::argument, "reload: the asset is not open");
+      Asset& asset = assets_[id.value];
+      if (asset.reloading) return failure(ErrorCode::argument, "reload: the asset is being reloaded");
+      asset.reloading = true;
+      asset.told = false;
+      startOpening(source, id, true);
+      return {};
+    });
+  }
+
+  void close(AssetId id) override {
+    const auto found = assets_.find(id.value);
+    if (found == assets_.end()) return;
+    players_.removeOf(id);
+    closeClips(found->second.clips);
+    closeClips(found->second.nextClips);
+    letGo(std::move(found->second.opened));
+    if (found->second.next) letGo(std::move(*found->second.next));
+    assets_.erase(found);
+  }
+
+  Result<InstanceId> addInstance(const InstanceInfo& info) override {
+    return guarded<InstanceId>([&]() -> Result<InstanceId> {
+      if (state(info.asset) != AssetState::ready) return failure(ErrorCode::argument, "the asset is not open");
+      const Asset& asset = assets_[info.asset.value];
+      if (info.volume >= asset.clips.size() || asset.clips[info.volume] == format::kNone) {
+        return failure(ErrorCode::argument, "the pack has no volume " + std::to_string(info.volume) + " with frames");
+      }
+      auto id = players_.add(info, asset.clips[info.volume]);
+      if (id && asset.next) players_.setSuccessors(asset.id, asset.nextClips);
+      return id;
+    });
+  }
+
+  void removeInstance(InstanceId instance) override { players_.remove(instance); }
+  void setPlayback(InstanceId instance, const Playback& playback) override { players_.setPlayback(instance, playback); }
+  void setTransform(InstanceId instance, const std::array<double, 12>& objectToWorld) override {
+    players_.setTransform(instance, objectToWorld);
+  }
+  void setPriority(InstanceId instance, float priority) override {
+    InstanceView* view = players_.find(instance);
+    if (view != nullptr && std::isfinite(priority)) view->priority = std::max(priority, 0.0f);
+  }
+  void seek(InstanceId instance, double time) override { players_.seek(instance, time); }
+
+  void setBudget(std::uint64_t gpuBytes, std::uint64_t cpuBytes) override {
+    config_.gpuBudget = gpuBytes;
+    config_.cpuBudget = cpuBytes;
+    if (transport_ != nullptr) transport_->setBudget(gpuBytes, cpuBytes);
+  }
+
+  void update(const UpdateInfo& info) override {
+    const auto done = guarded<void>([&]() -> Result<void> {
+      advance(info);
+      return {};
+    });
+    if (!done) tell({.code = done.error().code, .message = done.error().message + " in update()"});
+  }
+
+  Drawable drawable(InstanceId instance) const override { return players_.drawable(instance); }
+  UploadWait wait() const override { return transport_ != nullptr ? transport_->wait() : UploadWait{}; }
+  StreamStats stats() const override { return stats_; }
+
+  std::optional<StreamError> takeError() override {
+    if (errors_.empty()) return std::nullopt;
+    StreamError error = std::move(errors_.front());
+    errors_.pop_front();
+    return error;
+  }
+
+  void detach() override {
+    drop();
+    log(LogLevel::information, "detached from the device");
+  }
+
+  Result<void> attach(Renderer& renderer) override {
+    return guarded<void>([&]() -> Result<void> {
+      if (transport_ != nullptr) return failure(ErrorCode::argument, "attach: there is a device already");
+      return connect(&deviceOf(renderer));
+    });
+  }
+
+ private:
+  // A pack on its way: read on another thread, then found by update().
+  struct Opening {
+    StreamerImpl& self;
+    AssetId asset;
+    bool reload;
+    std::string path;
+    std::unique_ptr<TableReader> reader;
+  };
+
+  static void wake(void* self) { static_cast<StreamerImpl*>(self)->planning_.request(); }
+
+  static std::string nameOf(const PackSource& source) {
+    return source.source != nullptr ? "a source of the host's" : source.path;
+  }
+
+  void log(LogLevel level, const std::string& line) const {
+    if (config_.log.write != nullptr) config_.log.write(config_.log.user, level, line.c_str());
+  }
+
+  void tell(StreamError error) {
+    log(LogLevel::error, error.message);
+    if (errors_.size() < kMostErrors) errors_.push_back(std::move(error));
+  }
+
+  Result<void> checkSource(const PackSource& source) const {
+    if (transport_ == nullptr) return failure(ErrorCode::argument, "the streamer is detached");
+    if (source.path.empty() == (source.source == nullptr)) {
+      return failure(ErrorCode::argument, "PackSource: one of path and source must be given");
+    }
+    if (source.source == nullptr && config_.readThreads == 0) {
+      return failure(ErrorCode::argument, "StreamConfig: without readThreads packs come from sources alone");
+    }
+    return {};
+  }
+
+  // On the calling thread, which waits.
+  Result<Opened> openHere(const std::shared_ptr<AsyncSource>& source, AssetId id) {
+    std::mutex mutex;
+    std::condition_variable came;
+    bool done = false;
+    const auto reader = TableReader::make(source, id, Reserve{*transport_}, [&] {
+      const std::lock_guard lock(mutex);
+      done = true;
+      came.notify_all();
+    });
+    reader->start();
+    std::unique_lock lock(mutex);
+    came.wait(lock, [&] { return done; });
+    return reader->open();
+  }
+
+  void startOpening(const PackSource& source, AssetId id, bool reload) {
+    if (!jobs_.begin()) return;
+    auto* opening = new Opening{*this, id, reload, source.path, nullptr};
+    if (source.source == nullptr) return transport_->run(&finishOpening, opening);
+    opening->reader = TableReader::make(source.source, id, Reserve{*transport_},
+                                        [this, opening] { transport_->run(&finishOpening, opening); });
+    opening->reader->start();
+  }
+
+  static void finishOpening(void* context) {
+    const std::unique_ptr<Opening> opening(static_cast<Opening*>(context));
+    StreamerImpl& self = opening->self;
+    auto opened = opening->reader != nullptr ? opening->reader->open()
+                                             : openFile(opening->path, opening->asset, Reserve{*self.transport_});
+    opening->reader.reset();
+    {
+      const std::lock_guard lock(self.openMutex_);
+      self.opened_.push_back({opening->asset, opening->reload, std::move(opened)});
+    }
+    self.jobs_.end();
+  }
+
+  std::vector<std::uint32_t> openClips(const Opened& opened) {
+    std::vector<std::uint32_t> clips;
+    for (const auto& clip : opened.clips) clips.push_back(clip != nullptr ? players_.openClip(clip) : format::kNone);
+    return clips;
+  }
+
+  void closeClips(std::vector<std::uint32_t>& clips) {
+    for (const std::uint32_t clip : clips) {
+      if (clip != format::kNone) players_.closeClip(clip);
+    }
+    clips.clear();
+  }
+
+  void begin(Asset& asset, Opened opened) {
+    asset.clips = openClips(opened);
+    asset.opened = std::move(opened);
+    asset.state = AssetState::ready;
+  }
+
+  // The host may use the pack until the next update().
+  void letGo(Opened opened) {
+    if (transport_ != nullptr) transport_->releaseCpu(opened.bytes);
+    opened.bytes = 0;
+    dying_.push_back(std::move(opened));
+  }
+
+  void takeOpened() {
+    std::vector<OpenDone> opened;
+    {
+      const std::unique_lock lock(openMutex_, std::try_to_lock);
+      if (lock) opened.swap(opened_);
+    }
+    for (OpenDone& done : opened) takeOpened(done);
+  }
+
+  void takeOpened(OpenDone& done) {
+    const auto found = assets_.find(done.asset.value);
+    if (found == assets_.end()) {  // closed meanwhile
+      if (done.opened) letGo(std::move(*done.opened));
+      return;
+    }
+    Asset& asset = found->second;
+    if (!done.opened) {
+      tell({.code = done.opened.error().code, .asset = asset.id, .message = done.opened.error().message});
+      if (done.reload) asset.reloading = false;
+      if (!done.reload) asset.state = AssetState::failed;
+      return;
+    }
+    if (!done.reload) return begin(asset, std::move(*done.opened));
+    for (const InstanceView& view : players_.views()) {
+      const Clip& clip = *players_.track(view.clip).clip;
+      if (clip.asset != asset.id) continue;
+      if (clip.volume < done.opened->clips.size() && done.opened->clips[clip.volume] != nullptr) continue;
+      tell(
+          {.code = ErrorCode::pack,
+           .asset = asset.id,
+           .volume = clip.volume,
+           .message = "the new pack has no volume " + std::to_string(clip.volume) + " with frames; the old one stays"});
+      asset.reloading = false;
+      return letGo(std::move(*done.opened));
+    }
+    asset.nextClips = openClips(*done.opened);
+    asset.next = std::move(*done.opened);
+    players_.setSuccessors(asset.id, asset.nextClips);
+  }
+
+  void abandonReload(Asset& asset) {
+    if (!asset.told) {
+      tell({.code = ErrorCode::pack, .asset = asset.id, .message = "the new pack cannot be drawn; the old one stays"});
+    }
+    players_.setSuccessors(asset.id, {});
+    closeClips(asset.nextClips);
+    letGo(std::move(*asset.next));
+    asset.next.reset();
+    asset.reloading = false;
+  }
+
+  void finishReloads() {
+    for (auto& [id, asset] : assets_) {
+      if (!asset.next) continue;
+      if (players_.successorFailed(asset.id)) {
+        abandonReload(asset);
+      } else if (players_.succeed(asset.id)) {
+        closeClips(asset.clips);
+        letGo(std::exchange(asset.opened, std::move(*asset.next)));
+        asset.clips = std::move(asset.nextClips);
+        asset.nextClips.clear();
+        asset.next.reset();
+        asset.reloading = false;
+        log(LogLevel::information, "a reloaded pack has taken its place");
+      }
+    }
+  }
+
+  void advance(const UpdateInfo& info) {
+    const double seconds = std::isfinite(info.seconds) ? std::max(info.seconds, 0.0) : 0;
+    now_ += seconds;
+    ++stats_.updates;
+    dying_.clear();
+    if (transport_ == nullptr) return players_.advance(seconds, stats_.updates);
+    transport_->update();
+    planning_.take(changes_, met_, plan_);
+    players_.take(changes_, *transport_);
+    changes_.clear();
+    takeErrors();
+    takeOpened();
+    finishReloads();
+    players_.advance(seconds, stats_.updates);
+    players_.giveBack(*transport_, stats_.updates);
+    if (planning_.wantsSnapshot()) {
+      fillSnapshot(info);
+      planning_.publish(snapshot_);
+    }
+    planning_.request();
+    count();
+  }
+
+  void takeErrors() {
+    for (StreamError& error : met_) {
+      const auto found = assets_.find(error.asset.value);
+      if (found != assets_.end()) found->second.told = true;
+      tell(std::move(error));
+    }
+    met_.clear();
+  }
+
+  void fillSnapshot(const UpdateInfo& info) {
+    snapshot_.now = now_;
+    snapshot_.update = stats_.updates;
+    snapshot_.view = info.view;
+    if (info.view && badView(*info.view) != nullptr) snapshot_.view.reset();
+    snapshot_.pixelsHigh = info.pixelsHigh;
+    snapshot_.gpuBudget = config_.gpuBudget;
+    players_.fill(snapshot_);
+  }
+
+  void count() {
+    const TransportStats now = transport_->stats();
+    stats_.bytesRead = now.bytesRead - before_.bytesRead;
+    stats_.bytesDecompressed = now.bytesDecompressed - before_.bytesDecompressed;
+    stats_.bytesUploaded = now.bytesUploaded - before_.bytesUploaded;
+    before_ = now;
+    const RetiredCount retired = players_.retired();
+    stats_.framesEvicted = retired.frames - retiredBefore_.frames;
+    stats_.bytesEvicted = retired.bytes - retiredBefore_.bytes;
+    retiredBefore_ = retired;
+    stats_.framesLoaded = plan_.framesLoaded - loadedBefore_;
+    loadedBefore_ = plan_.framesLoaded;
+    stats_.gpuBytes = plan_.gpuBytes;
+    stats_.gpuAllocated = now.gpuAllocated;
+    stats_.gpuPeak = now.gpuPeak;
+    stats_.cpuBytes = now.cpuBytes;
+    stats_.cpuPeak = now.cpuPeak;
+    stats_.framesResident = plan_.framesResident;
+    stats_.loadsQueued = plan_.loadsQueued;
+    stats_.loadsReading = plan_.loadsReading;
+    stats_.loadsDecoding = plan_.loadsDecoding;
+    stats_.loadsUploading = plan_.loadsUploading;
+    stats_.missingBricks = plan_.missingBricks;
+    const InstanceCount instances = players_.count();
+    stats_.instances = instances.all;
+    stats_.instancesHeld = instances.held;
+    stats_.instancesCoarse = instances.coarse;
+    stats_.instancesEmpty = instances.empty;
+  }
+
+  // Everything on the device is given back, or is about to be with the transport.
+  void drop() {
+    if (transport_ == nullptr) return;
+    jobs_.stop();
+    takeOpened();
+    planning_.stop();
+    changes_.clear();
+    met_.clear();
+    snapshot_ = {};
+    players_.dropFrames();
+    plan_ = {};
+    loadedBefore_ = 0;
+    transport_.reset();
+  }
+
+  StreamConfig config_;
+  MakeTransport make_;
+  OpenJobs jobs_;
+  std::unique_ptr<Transport> transport_;
+  Planning planning_;
+  Players players_;
+  std::map<std::uint32_t, Asset> assets_;
+  std::vector<Opened> dying_;
+  std::uint32_t nextAsset_ = 1;
+  double now_ = 0;
+  // Scratch of update().
+  std::vector<Change> changes_;
+  std::vector<StreamError> met_;
+  Snapshot snapshot_;
+  PlanStats plan_;
+  TransportStats before_;
+  RetiredCount retiredBefore_;
+  std::uint32_t loadedBefore_ = 0;
+  StreamStats stats_;
+  std::deque<StreamError> errors_;
+  std::mutex openMutex_;
+  std::vector<OpenDone> opened_;  // by openMutex_
+};
+
+}  // namespace
+
+Device& Streamer::deviceOf(Renderer& renderer) {
+  return renderer.device();
+}
+
+Result<std::unique_ptr<Streamer>> makeStreamer(const StreamConfig& config, Device* device, MakeTransport make,
+                                               PlanOn on) {
+  if (const char* field = badField(config)) {
+    return failure(ErrorCode::argument, std::string("StreamConfig: ") + field + " is outside of its range");
+  }
+  return guarded<std::unique_ptr<Streamer>>([&]() -> Result<std::unique_ptr<Streamer>> {
+    auto streamer = std::make_unique<StreamerImpl>(config, std::move(make), on);
+    if (auto connected = streamer->connect(device); !connected) return tl::unexpected(connected.error());
+    return std::unique_ptr<Streamer>(std::move(streamer));
+  });
+}
+
+}  // namespace billow::runtime
