@@ -514,6 +514,8 @@ TEST_F(StreamPlan, RandomScenarios) {
       }
       if (testing::Test::HasFailure()) return;
     }
+    // Detail that the budget took comes back after some seconds.
+    stream.update(60, 0.5);
     for (const Known& one : known) {
       EXPECT_FALSE(stream->drawable(one.id).held) << "seed " << seed;
       EXPECT_FALSE(stream->drawable(one.id).coarse) << "seed " << seed;

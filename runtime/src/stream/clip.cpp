@@ -11,10 +11,7 @@
 namespace billow::runtime {
 namespace {
 
-// Volumes that hold the same frames with larger voxels, the finest first.
-std::vector<std::uint32_t> coarserVolumes(const format::Pack&, std::uint32_t) {
-  return {};
-}
+constexpr std::uint32_t kMeansLog2 = 3;  // of the length of a voxel of means
 
 // Everything of a grid frame that can be seen. Two frames with equal roots and constants are one.
 using GridKey =
@@ -108,17 +105,20 @@ void addLevels(const format::Pack& pack, std::uint32_t volume, Clip& clip) {
     clip.levels.push_back({.volume = number, .grids = chooseGrids(pack, record), .voxel = voxelWidth(pack, record)});
   };
   add(volume);
-  for (const std::uint32_t coarser : coarserVolumes(pack, volume)) add(coarser);
+  for (const format::LevelRecord& level : pack.levelsOf(volume)) {
+    // Means are as coarse as that, and smaller than a tree.
+    if (level.log2 < kMeansLog2) add(level.level);
+  }
   ClipLevel means = clip.levels.front();
   means.means = true;
-  means.voxel *= 8;
+  means.voxel *= 1 << kMeansLog2;
   clip.levels.push_back(means);
 }
 
 std::shared_ptr<const Clip> makeClip(const std::shared_ptr<OpenPack>& open, AssetId asset, std::uint32_t volume) {
   const format::Pack& pack = open->pack;
   const format::VolumeRecord& record = pack.volumes()[volume];
-  if (record.frameCount == 0) return nullptr;
+  if (record.frameCount == 0 || pack.isLevel(volume)) return nullptr;
   auto clip = std::make_shared<Clip>();
   clip->pack = open;
   clip->asset = asset;

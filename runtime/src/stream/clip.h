@@ -45,7 +45,7 @@ struct Clip {
   std::uint64_t bricks(std::uint32_t item) const;
 };
 
-// One for each volume that has frames; the others are null.
+// One for each volume that has frames and is no level of another; null in place of the rest.
 std::vector<std::shared_ptr<const Clip>> makeClips(const std::shared_ptr<OpenPack>& pack, AssetId asset);
 
 }  // namespace billow::runtime

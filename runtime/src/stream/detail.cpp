@@ -110,6 +110,10 @@ void Detail::rank(const Snapshot& snapshot) {
 void Detail::choose(const Snapshot& snapshot, std::vector<PlannedClip>& clips, const Transport& transport,
                     std::uint64_t pass, std::vector<Change>& changes) {
   rank(snapshot);
+  if (snapshot.gpuBudget > budget_) {
+    for (State& state : states_) state.pause = kLevelPause;
+  }
+  budget_ = snapshot.gpuBudget;
   const auto budget = static_cast<double>(snapshot.gpuBudget);
   double taken = 0;
   // What is counted once is marked: with an even number at its coarsest, with an odd one at the level that is chosen.

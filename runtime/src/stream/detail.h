@@ -68,6 +68,7 @@ class Detail {
   State& stateOf(const InstanceView& instance);
   void rank(const Snapshot& snapshot);
 
+  std::uint64_t budget_ = 0;   // of the pass before
   std::vector<State> states_;  // by handle slot
   std::vector<Ranked> ranked_, unsorted_;
 };
