@@ -1,5 +1,6 @@
 #include "page_compressor.h"
 
+#define ZSTD_STATIC_LINKING_ONLY  // how literals are coded
 #include <zstd.h>
 
 #include <algorithm>
@@ -14,13 +15,25 @@ namespace {
 
 using Context = std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)>;
 
-constexpr int kZstdLevel = 3, kQuickLevel = 1;
+struct ZstdSettings {
+  int level;
+  ZSTD_literalCompressionMode_e literals;
+};
+constexpr ZstdSettings kUsual{3, ZSTD_lcm_auto}, kQuickLook{1, ZSTD_lcm_auto};
+// What is not found again is left as it is: reading is half as fast again, and a longer search makes up for the size.
+constexpr ZstdSettings kFastReading{9, ZSTD_lcm_uncompressed};
 
-std::vector<std::byte> compressZstd(ZSTD_CCtx* context, std::span<const std::byte> raw, int level) {
+std::size_t checked(std::size_t result) {
+  if (ZSTD_isError(result)) throw std::runtime_error(ZSTD_getErrorName(result));
+  return result;
+}
+
+std::vector<std::byte> compressZstd(ZSTD_CCtx* context, std::span<const std::byte> raw, const ZstdSettings& settings) {
+  checked(ZSTD_CCtx_reset(context, ZSTD_reset_session_and_parameters));
+  checked(ZSTD_CCtx_setParameter(context, ZSTD_c_compressionLevel, settings.level));
+  checked(ZSTD_CCtx_setParameter(context, ZSTD_c_literalCompressionMode, settings.literals));
   std::vector<std::byte> stored(ZSTD_compressBound(raw.size()));
-  const std::size_t size = ZSTD_compressCCtx(context, stored.data(), stored.size(), raw.data(), raw.size(), level);
-  if (ZSTD_isError(size)) throw std::runtime_error(ZSTD_getErrorName(size));
-  stored.resize(size);
+  stored.resize(checked(ZSTD_compress2(context, stored.data(), stored.size(), raw.data(), raw.size())));
   return stored;
 }
 
@@ -35,10 +48,11 @@ CompressedPage compress(ZSTD_CCtx* context, std::vector<std::byte> raw, const Pa
   std::vector<std::byte> modelled;
   if (compression == Compression::small) {
     modelled = encodePage(runs, raw);
-    if (isWell(modelled.size(), raw.size()) && compressZstd(context, raw, kQuickLevel).size() >= modelled.size())
+    if (isWell(modelled.size(), raw.size()) && compressZstd(context, raw, kQuickLook).size() >= modelled.size())
       return {std::move(modelled), Codec::model};
   }
-  CompressedPage page{compressZstd(context, raw, kZstdLevel), Codec::zstd};
+  const ZstdSettings& settings = compression == Compression::small ? kUsual : kFastReading;
+  CompressedPage page{compressZstd(context, raw, settings), Codec::zstd};
   if (compression == Compression::small && modelled.size() < page.stored.size())
     page = {std::move(modelled), Codec::model};
   if (page.stored.size() >= raw.size()) return {std::move(raw), Codec::raw};
