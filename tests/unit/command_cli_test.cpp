@@ -39,7 +39,7 @@ TEST(Cli, WrongCommandLinesExitWithOne) {
 TEST(Cli, CompressesAsAskedAndSaysSo) {
   const TempFolder folder;
   std::map<std::string, nlohmann::json> infos;
-  for (const std::string how : {"small", "fast"}) {
+  for (const std::string how : {"small", "fast", "none"}) {
     const std::string pack = folder / (how + ".blw");
     ASSERT_EQ(billow("compile " + quoted(sampleFire()) + " --compress " + how + " -o " + quoted(pack)).code, 0);
     EXPECT_EQ(billow("validate " + quoted(pack)).code, 0);
@@ -50,6 +50,8 @@ TEST(Cli, CompressesAsAskedAndSaysSo) {
   EXPECT_EQ(infos["fast"]["pages"]["codecs"]["model"], 0);
   EXPECT_GT(infos["fast"]["pages"]["codecs"]["zstd"], 0);
   EXPECT_LT(infos["small"]["disk"]["pages"], infos["fast"]["disk"]["pages"]);
+  EXPECT_EQ(infos["none"]["pages"]["codecs"]["raw"], infos["none"]["pages"]["count"]);
+  EXPECT_EQ(infos["none"]["disk"]["pages"], infos["none"]["pages"]["rawBytes"]);
 }
 
 TEST(Cli, MissingFilesExitWithTwoAndAreNamed) {
