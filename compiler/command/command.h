@@ -31,6 +31,7 @@ void addValidate(CLI::App& app, Run& run);
 void addExtract(CLI::App& app, Run& run);
 void addCompare(CLI::App& app, Run& run);
 void addRender(CLI::App& app, Run& run);
+void addView(CLI::App& app, Run& run);
 
 // Prints "billow: error: PATH: ..." to stderr and returns the exit code: kFile when the bytes could not be read, else
 // kInvalid.

@@ -75,6 +75,9 @@ void addCommands(CLI::App& app, billow::command::Run& run) {
 #ifdef BILLOW_WITH_RUNTIME
   addRender(app, run);
 #endif
+#ifdef BILLOW_WITH_VIEWER
+  addView(app, run);
+#endif
 }
 
 int runCommandLine(int argc, char** argv) {

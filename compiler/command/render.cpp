@@ -2,7 +2,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <map>
@@ -12,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "billow/format/look.h"
 #include "billow/headless/headless.h"
 #include "billow/runtime/look.h"
 #include "command.h"
@@ -22,11 +20,10 @@
 #include "render_image.h"
 #include "render_metavoxel.h"
 #include "render_setup.h"
+#include "render_stage.h"
 
 namespace billow::command {
 namespace {
-
-constexpr std::size_t kMostParticles = 1048576;  // of a draw
 
 int complain(const Refusal& refusal) {
   fmt::print(stderr, "billow: error: {}\n", refusal.message);
@@ -101,18 +98,6 @@ struct Job {
   bool png;
 };
 
-// How layers of the volume look and where they are, in a draw with such a look.
-runtime::MetavoxelVolume place(const Job& job, const PlacedVolume& volume, std::span<const runtime::Layer> layers,
-                               const runtime::Look& shared) {
-  runtime::MetavoxelVolume placed{
-      .layers = layers, .velocityScale = job.request.velocityScale, .objectToWorld = volume.request->transform};
-  placed.look = lookOf(job.request, *volume.request, volume.suggested, volume.scale());
-  placed.look.ambient = shared.ambient;
-  placed.look.anisotropy = shared.anisotropy;
-  placed.look.scatteringOrders = shared.scatteringOrders;
-  return placed;
-}
-
 // The device, what draws on it, and the frames that were shown last.
 class Painter {
  public:
@@ -148,7 +133,7 @@ class Painter {
       auto layers = layersOf(volume, frames_[i], shares);
       if (!layers) return tl::unexpected(layers.error());
       shown.layers[i] = std::move(*layers);
-      if (!shares.empty()) shown.volumes.push_back(place(job, volume, shown.layers[i], draw.look));
+      if (!shares.empty()) shown.volumes.push_back(placed(job.request, volume, shown.layers[i], draw.look));
     }
     shown.effects = job.contents.effectsAt(moment.time);
     if (!metavoxels_) {
@@ -194,54 +179,13 @@ class Painter {
   std::vector<ResidentFrames> frames_;  // by volume
 };
 
-// The axis of the scene along which the gas of the first volume rises, or the particles.
-char upOf(const Contents& contents) {
-  if (contents.volumes().empty()) return 'y';
-  const PlacedVolume& volume = contents.volumes().front();
-  const std::size_t axis = risingAxis(*volume.pack, volume.record(), volume.grids) == 'y' ? 1 : 2;
-  const Matrix& m = volume.request->transform;
-  const double y = std::abs(m[4 + axis]), z = std::abs(m[8 + axis]);
-  return y > z || (y == z && axis == 1) ? 'y' : 'z';
-}
-
-// The camera frames all of the volumes' sequences, so that a frame alone and within a range are the same picture; of
-// effects, what is alive in the frames asked for.
-Stage stageOf(const Job& job, SpaceNeeds& needs) {
-  Stage stage{.box = {}, .up = upOf(job.contents), .burning = false, .ambientGiven = false};
-  for (const PlacedVolume& volume : job.contents.volumes()) {
-    addBox(volume.box(), stage.box);
-    stage.burning = stage.burning || volume.suggested.emissionScale * volume.request->look.fire > 0;
-    stage.ambientGiven = stage.ambientGiven || format::isSet(volume.record().look, format::kLookAmbient);
-  }
-  for (const Moment& moment : job.moments) {
-    const Particles particles = job.contents.particlesAt(moment.time);
-    addParticles(particles, stage.box);
-    needs.particles = std::max(needs.particles, job.contents.mostParticles(moment.time));
-    if (!job.contents.volumes().empty()) continue;
-    for (const format::Particle& particle : particles) {
-      for (const float channel : particle.emission) stage.burning = stage.burning || channel > 0;
-    }
-  }
-  return stage;
-}
-
 Checked<void> renderMoments(const Job& job) {
-  const std::vector<PlacedVolume>& volumes = job.contents.volumes();
-  SpaceNeeds needs{.box = {},
-                   .lattice = job.contents.finestVoxels(),
-                   .volumes = static_cast<std::uint32_t>(volumes.size()),
-                   .particles = 0};
-  const Stage stage = stageOf(job, needs);
-  needs.box = stage.box;
-  if (needs.particles > kMostParticles) {
-    return refuse(kInvalid,
-                  fmt::format("{} particles may be alive at once; expected at most {} of all effects together",
-                              needs.particles, kMostParticles));
-  }
-  runtime::Look suggested;
-  suggested.scatteringOrders = 4;
-  if (!volumes.empty()) suggested = volumes.front().suggested;
-  const runtime::DrawInfo draw = setUp(job.request, stage, suggested, job.png);
+  std::vector<double> times;
+  for (const Moment& moment : job.moments) times.push_back(moment.time);
+  SpaceNeeds needs;
+  const auto stage = stageOf(job.contents, times, needs);
+  if (!stage) return tl::unexpected(stage.error());
+  const runtime::DrawInfo draw = setUp(job.request, *stage, suggestedLook(job.contents), job.png);
   auto painter = Painter::make(job, needs);
   if (!painter) return tl::unexpected(painter.error());
   // No prepare(): it builds the pipelines of every frame ahead, so that none is late. Here nobody waits for a frame,

@@ -15,28 +15,9 @@
 #include <vector>
 
 #include "billow/format/temp_file.h"
+#include "tone.h"
 
 namespace billow::command {
-namespace {
-
-// A fit of the ACES film curve (Narkowicz 2015, "ACES filmic tone mapping curve"); linear in, linear [0, 1] out.
-float filmic(float x) {
-  x = x > 0 ? std::min(x, 1e6f) : 0;  // also of NaN, and no infinity over infinity
-  return std::clamp(x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f), 0.0f, 1.0f);
-}
-
-float srgb(float linear) {
-  return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1 / 2.4f) - 0.055f;
-}
-
-// In [0, 1): hides the bands of a smooth background in 8 bits, the same for every run.
-float dither(std::uint32_t x, std::uint32_t y) {
-  const float a = 0.06711056f * static_cast<float>(x) + 0.00583715f * static_cast<float>(y);
-  const float b = 52.9829189f * (a - std::floor(a));
-  return b - std::floor(b);
-}
-
-}  // namespace
 
 std::string encodeExr(const headless::Picture& picture) {
   const std::size_t pixels = std::size_t{picture.width} * picture.height;
@@ -75,8 +56,8 @@ std::string encodePng(const headless::Picture& picture, float exposure) {
     for (std::uint32_t x = 0; x < picture.width; ++x) {
       const float* pixel = &picture.rgba[(std::size_t{y} * picture.width + x) * 4];
       for (int c = 0; c < 3; ++c) {
-        const float value = srgb(filmic(pixel[c] * gain)) * 255 + dither(x, y);
-        rgb.push_back(static_cast<std::uint8_t>(std::clamp(value, 0.0f, 255.0f)));
+        const float level = tone::shown(pixel[c] * gain, static_cast<float>(x), static_cast<float>(y));
+        rgb.push_back(static_cast<std::uint8_t>(level));
       }
     }
   }

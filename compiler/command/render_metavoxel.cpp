@@ -67,15 +67,14 @@ runtime::Result<MetavoxelPainter> MetavoxelPainter::make(runtime::Renderer& rend
                  .maxListEntries = kMostEntries,
                  .maxVolumes = needs.volumes,
                  .lightField = surroundings.share > 0 ? kMostAlong : 0,
-                 .recordsInFlight = 1,
+                 .recordsInFlight = needs.recordsInFlight,
                  .tables = &tables});
   if (!made) return tl::unexpected(made.error());
   painter.metavoxels_ = std::move(*made);
   return painter;
 }
 
-runtime::Result<headless::Picture> MetavoxelPainter::render(headless::Headless& gpu, runtime::Renderer& renderer,
-                                                            const runtime::DrawInfo& draw, const Shown& shown) {
+runtime::MetavoxelDraw MetavoxelPainter::describe(const runtime::DrawInfo& draw, const Shown& shown) const {
   runtime::MetavoxelDraw info;
   info.view = draw.view;
   info.sun = draw.sun;
@@ -92,16 +91,28 @@ runtime::Result<headless::Picture> MetavoxelPainter::render(headless::Headless& 
   info.width = draw.width;
   info.height = draw.height;
   info.colorFormat = draw.colorFormat;
-  auto picture = gpu.render(renderer, *metavoxels_, info, {});
-  if (!picture) return picture;
+  info.color = draw.color;
+  info.depth = draw.depth;
+  return info;
+}
+
+runtime::Result<void> MetavoxelPainter::checkRoom() const {
   const runtime::MetavoxelStats stats = metavoxels_->stats();
-  if (stats.drawn == stats.occupied && stats.listEntries <= mostEntries_) return picture;
+  if (stats.drawn == stats.occupied && stats.listEntries <= mostEntries_) return {};
   return tl::unexpected(runtime::Error{
       .code = runtime::ErrorCode::budget,
       .message =
           fmt::format("the picture needs {} metavoxels and {} entries of particles in them; there is room for {} "
                       "and {}: take larger voxels (--voxel-size)",
                       stats.occupied, stats.listEntries, kMostMetavoxels, mostEntries_)});
+}
+
+runtime::Result<headless::Picture> MetavoxelPainter::render(headless::Headless& gpu, runtime::Renderer& renderer,
+                                                            const runtime::DrawInfo& draw, const Shown& shown) {
+  auto picture = gpu.render(renderer, *metavoxels_, describe(draw, shown), {});
+  if (!picture) return picture;
+  if (auto room = checkRoom(); !room) return tl::unexpected(room.error());
+  return picture;
 }
 
 }  // namespace billow::command

@@ -29,6 +29,7 @@ struct SpaceNeeds {
   VoxelLattice lattice;
   std::uint32_t volumes = 0;    // at once
   std::uint64_t particles = 0;  // no more than a draw's limit
+  std::uint32_t recordsInFlight = 1;
 };
 
 struct Surroundings {  // as runtime::Scattering has them
@@ -45,6 +46,13 @@ class MetavoxelPainter {
                                                 Surroundings surroundings);
 
   // `draw` as for the direct method; of its look, how everything scatters. Without shadows light passes unhindered.
+  // `shown` must outlive what is made of it.
+  runtime::MetavoxelDraw describe(const runtime::DrawInfo& draw, const Shown& shown) const;
+  // Says what the last draw had no room for; nothing where it had.
+  runtime::Result<void> checkRoom() const;
+  runtime::Metavoxels& metavoxels() { return *metavoxels_; }
+  float voxelSize() const { return voxelSize_; }
+
   runtime::Result<headless::Picture> render(headless::Headless& gpu, runtime::Renderer& renderer,
                                             const runtime::DrawInfo& draw, const Shown& shown);
 

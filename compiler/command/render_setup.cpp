@@ -32,22 +32,6 @@ Vec upward(char up) {
   return up == 'y' ? Vec{0, 1, 0} : Vec{0, 0, 1};
 }
 
-// How far from the box's centre the eye must be for the box to lie in the picture. Gas hardly reaches into the very
-// corners, so that they may touch the frame while edges and faces keep a margin.
-double fittingDistance(const runtime::WorldBox& box, const Vec& center, const runtime::View& view, double aspect) {
-  const double tanY = double{view.tanHalfHeight} / kMargin;
-  double distance = 0;
-  for (int place = 0; place < 27; ++place) {
-    const int sides[3] = {place / 9 - 1, place / 3 % 3 - 1, place % 3 - 1};
-    const double reach = sides[0] * sides[1] * sides[2] != 0 ? 1 / kMargin : 1;
-    Vec at;
-    for (std::size_t i = 0; i < 3; ++i) at[i] = sides[i] * (box.max[i] - center[i]) * reach;
-    const double across = std::max(std::abs(dot(at, view.right)) / (tanY * aspect), std::abs(dot(at, view.up)) / tanY);
-    distance = std::max(distance, across - dot(at, view.forward));
-  }
-  return distance;
-}
-
 runtime::View chooseView(const RenderRequest& request, const runtime::WorldBox& box, char up) {
   const CameraRequest& camera = request.camera;
   if (camera.eye) return runtime::lookAt(*camera.eye, *camera.target, upward(up), camera.fieldOfView);
@@ -63,15 +47,11 @@ runtime::View chooseView(const RenderRequest& request, const runtime::WorldBox& 
 }
 
 runtime::Sun chooseSun(const RenderRequest& request, char up, bool burning) {
-  const Vec towards = direction(up, kSunAzimuth, kSunElevation);
-  const Triple direction{static_cast<float>(towards[0]), static_cast<float>(towards[1]),
-                         static_cast<float>(towards[2])};
-  const Triple color = request.sunColor.value_or(Triple{1.0f, 0.93f, 0.82f});
-  // Beside a fire the sun is a dim one, so that the fire is what lights the picture.
-  const float intensity = request.sunIntensity.value_or(burning ? 3.2f : 8.5f);
+  const SunChoice choice = sunOf(request, up, burning);
   runtime::Sun sun;
-  sun.direction = request.sunDirection.value_or(direction);
-  sun.irradiance = {color[0] * intensity, color[1] * intensity, color[2] * intensity};
+  sun.direction = choice.direction;
+  sun.irradiance = {choice.color[0] * choice.intensity, choice.color[1] * choice.intensity,
+                    choice.color[2] * choice.intensity};
   return sun;
 }
 
@@ -103,6 +83,30 @@ runtime::Look chooseLook(const LookRequest& wanted, runtime::Look look, bool bur
 }
 
 }  // namespace
+
+double fittingDistance(const runtime::WorldBox& box, const Vec& center, const runtime::View& view, double aspect) {
+  const double tanY = double{view.tanHalfHeight} / kMargin;
+  double distance = 0;
+  for (int place = 0; place < 27; ++place) {
+    const int sides[3] = {place / 9 - 1, place / 3 % 3 - 1, place % 3 - 1};
+    const double reach = sides[0] * sides[1] * sides[2] != 0 ? 1 / kMargin : 1;
+    Vec at;
+    for (std::size_t i = 0; i < 3; ++i) at[i] = sides[i] * (box.max[i] - center[i]) * reach;
+    const double across = std::max(std::abs(dot(at, view.right)) / (tanY * aspect), std::abs(dot(at, view.up)) / tanY);
+    distance = std::max(distance, across - dot(at, view.forward));
+  }
+  return distance;
+}
+
+SunChoice sunOf(const RenderRequest& request, char up, bool burning) {
+  const Vec towards = direction(up, kSunAzimuth, kSunElevation);
+  const Triple direction{static_cast<float>(towards[0]), static_cast<float>(towards[1]),
+                         static_cast<float>(towards[2])};
+  return {.direction = request.sunDirection.value_or(direction),
+          .color = request.sunColor.value_or(Triple{1.0f, 0.93f, 0.82f}),
+          // Beside a fire the sun is a dim one, so that the fire is what lights the picture.
+          .intensity = request.sunIntensity.value_or(burning ? 3.2f : 8.5f)};
+}
 
 runtime::Look lookOf(const RenderRequest& request, const VolumeRequest& volume, const runtime::Look& suggested,
                      double scale) {

@@ -20,6 +20,18 @@ struct Stage {
   bool ambientGiven;  // by the pack
 };
 
+// How far from the box's centre the eye must be for the box to lie in a picture of width over height `aspect`. Gas
+// hardly reaches into the very corners, so that they may touch the frame while edges and faces keep a margin.
+double fittingDistance(const runtime::WorldBox& box, const std::array<double, 3>& center, const runtime::View& view,
+                       double aspect);
+
+// The sun that a request asks for, or one that suits what is to be seen.
+struct SunChoice {
+  Triple direction, color;
+  float intensity;
+};
+SunChoice sunOf(const RenderRequest& request, char up, bool burning);
+
 // Everything of a DrawInfo but the frame. `opaque` asks for a background that fills the picture. Its look is the
 // suggested one with what the request says, and how everything in the picture scatters.
 runtime::DrawInfo setUp(const RenderRequest& request, const Stage& stage, const runtime::Look& suggested, bool opaque);

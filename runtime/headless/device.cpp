@@ -1,4 +1,4 @@
-#include "device.h"
+#include "billow/headless/device.h"
 
 #include <dlfcn.h>
 #include <link.h>
@@ -93,9 +93,9 @@ VulkanDevice::~VulkanDevice() {
 
 Result<void> VulkanDevice::open(const DeviceOptions& options) {
   if (auto done = loadLibrary(); !done) return done;
-  if (auto done = createInstance(options.validation); !done) return done;
+  if (auto done = createInstance(options); !done) return done;
   if (auto done = pickDevice(options); !done) return done;
-  return createDevice();
+  return createDevice(options.presents != nullptr);
 }
 
 Result<void> VulkanDevice::loadLibrary() {
@@ -111,21 +111,22 @@ Result<void> VulkanDevice::loadLibrary() {
   return {};
 }
 
-Result<void> VulkanDevice::createInstance(bool validation) {
+Result<void> VulkanDevice::createInstance(const DeviceOptions& options) {
   auto application = begin<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
   application.pApplicationName = "billow";
   application.apiVersion = VK_API_VERSION_1_3;
   const auto messenger = messengerInfo(this);
-  const char* extension = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
+  std::vector<const char*> extensions = options.instanceExtensions;
   auto info = begin<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
   info.pApplicationInfo = &application;
-  if (validation) {
+  if (options.validation) {
     info.pNext = &messenger;
     info.enabledLayerCount = 1;
     info.ppEnabledLayerNames = &kValidationLayer;
-    info.enabledExtensionCount = 1;
-    info.ppEnabledExtensionNames = &extension;
+    extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
   }
+  info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
+  info.ppEnabledExtensionNames = extensions.data();
   const VkResult result = vk.vkCreateInstance(&info, nullptr, &host.instance);
   if (result == VK_ERROR_LAYER_NOT_PRESENT) return gpuError(std::string("no ") + kValidationLayer);
   if (result != VK_SUCCESS) return gpuError("no Vulkan: vkCreateInstance gives VkResult " + std::to_string(result));
@@ -133,7 +134,7 @@ Result<void> VulkanDevice::createInstance(bool validation) {
   vk.function = reinterpret_cast<PFN_##function>(vk.vkGetInstanceProcAddr(host.instance, #function));
   BILLOW_HEADLESS_INSTANCE(BILLOW_LOAD)
 #undef BILLOW_LOAD
-  if (!validation) return {};
+  if (!options.validation) return {};
   const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
       vk.vkGetInstanceProcAddr(host.instance, "vkCreateDebugUtilsMessengerEXT"));
   if (create == nullptr || create(host.instance, &messenger, nullptr, &messenger_) != VK_SUCCESS) {
@@ -156,29 +157,37 @@ Result<void> VulkanDevice::pickDevice(const DeviceOptions& options) {
     VkPhysicalDeviceProperties properties{};
     vk.vkGetPhysicalDeviceProperties(devices[i], &properties);
     if (!fits(vk, devices[i], properties) || rank(properties.deviceType) >= best) continue;
+    const auto family = familyOf(devices[i], options);
+    if (!family) continue;
+    host.uploadFamily = host.drawFamily = *family;
     best = rank(properties.deviceType);
     host.physicalDevice = devices[i];
     name = properties.deviceName;
     timestampPeriod = properties.limits.timestampPeriod;
   }
   if (host.physicalDevice == VK_NULL_HANDLE) {
-    return gpuError(
-        "no usable Vulkan device: it must have Vulkan 1.3 with buffer device addresses (a GPU driver, or Debian "
-        "package mesa-vulkan-drivers to render on the CPU)");
+    return gpuError(std::string("no usable Vulkan device: it must have Vulkan 1.3 with buffer device addresses") +
+                    (options.presents ? " and present to the window" : "") +
+                    " (a GPU driver, or Debian package mesa-vulkan-drivers to render on the CPU)");
   }
   return {};
 }
 
-Result<void> VulkanDevice::createDevice() {
+std::optional<std::uint32_t> VulkanDevice::familyOf(VkPhysicalDevice device, const DeviceOptions& options) const {
   std::uint32_t count = 0;
-  vk.vkGetPhysicalDeviceQueueFamilyProperties(host.physicalDevice, &count, nullptr);
+  vk.vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
   std::vector<VkQueueFamilyProperties> families(count);
-  vk.vkGetPhysicalDeviceQueueFamilyProperties(host.physicalDevice, &count, families.data());
-  const auto family = std::find_if(families.begin(), families.end(), [](const VkQueueFamilyProperties& properties) {
-    return (properties.queueFlags & VK_QUEUE_COMPUTE_BIT) != 0;
-  });
-  if (family == families.end()) return gpuError(name + " has no compute queue");
-  host.uploadFamily = host.drawFamily = static_cast<std::uint32_t>(family - families.begin());
+  vk.vkGetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
+  VkQueueFlags wanted = VK_QUEUE_COMPUTE_BIT;
+  if (options.presents) wanted |= VK_QUEUE_GRAPHICS_BIT;
+  for (std::uint32_t family = 0; family < count; ++family) {
+    if ((families[family].queueFlags & wanted) != wanted) continue;
+    if (!options.presents || options.presents(host.instance, device, family)) return family;
+  }
+  return std::nullopt;
+}
+
+Result<void> VulkanDevice::createDevice(bool swapchains) {
   Features available;
   vk.vkGetPhysicalDeviceFeatures2(host.physicalDevice, &available.core);
   Features wanted;
@@ -194,6 +203,9 @@ Result<void> VulkanDevice::createDevice() {
   info.pNext = &wanted.core;
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queueInfo;
+  const char* const swapchain = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
+  info.enabledExtensionCount = swapchains ? 1 : 0;
+  info.ppEnabledExtensionNames = &swapchain;
   const VkResult result = vk.vkCreateDevice(host.physicalDevice, &info, nullptr, &host.device);
   if (result != VK_SUCCESS) return gpuError(name + ": vkCreateDevice gives VkResult " + std::to_string(result));
 #define BILLOW_LOAD(function) \

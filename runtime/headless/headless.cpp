@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "target.h"
+#include "billow/headless/target.h"
 
 namespace billow::headless {
 namespace {

@@ -1,4 +1,4 @@
-#include "target.h"
+#include "billow/headless/target.h"
 
 namespace billow::headless {
 

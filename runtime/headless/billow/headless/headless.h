@@ -7,22 +7,15 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "billow/headless/device.h"
 #include "billow/runtime/metavoxel.h"
 #include "billow/runtime/runtime.h"
 
 namespace billow::headless {
-
-using runtime::Result;
-
-struct DeviceOptions {
-  std::optional<std::uint32_t> device = {};  // as Vulkan numbers them; default: a discrete GPU if there is one
-  bool validation = false;                   // VK_LAYER_KHRONOS_validation; fails where it is not installed
-};
 
 // A picture that was drawn and read back.
 struct Picture {

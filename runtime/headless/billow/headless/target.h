@@ -2,7 +2,7 @@
 #ifndef BILLOW_HEADLESS_TARGET_H
 #define BILLOW_HEADLESS_TARGET_H
 
-#include "device.h"
+#include "billow/headless/device.h"
 
 namespace billow::headless {
 
