@@ -63,6 +63,7 @@ class HeadlessImpl final : public Headless {
 
   const runtime::HostDevice& host() const override { return device_.host; }
   const std::string& deviceName() const override { return device_.name; }
+  const VulkanDevice& device() const override { return device_; }
   const std::vector<std::string>& validationMessages() const override { return device_.messages; }
   void waitIdle() override { device_.vk.vkDeviceWaitIdle(device_.host.device); }
 

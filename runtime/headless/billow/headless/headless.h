@@ -1,5 +1,5 @@
-// The smallest host for billow: a Vulkan device without a window, and pictures read back to memory. Used by the render
-// command, the tests and the benchmark; a game has all of this already.
+// The smallest host for billow: a Vulkan device, and pictures read back to memory, no window needed. Used by the render
+// command, the viewer, the tests and the benchmark; a game has all of this already.
 #ifndef BILLOW_HEADLESS_HEADLESS_H
 #define BILLOW_HEADLESS_HEADLESS_H
 
@@ -41,6 +41,7 @@ class Headless {
 
   virtual const runtime::HostDevice& host() const = 0;
   virtual const std::string& deviceName() const = 0;
+  virtual const VulkanDevice& device() const = 0;
   // What the validation layer has said so far: empty is good.
   virtual const std::vector<std::string>& validationMessages() const = 0;
 
