@@ -245,6 +245,8 @@ class Viewer {
     const VkCommandBuffer commands = screen_.begin(pixels);
     if (commands == VK_NULL_HANDLE) return;
     painter_.readTimes(screen_.slot());
+    std::string& title = titles_[screen_.slot()];
+    if (!title.empty()) window_.setTitle(title);
     const Timeline& timeline = *document_->timeline;
     const auto arrived = painter_.update(timeline.time(), timeline.velocity());
     if (!arrived) panels_.complain(arrived.error().message);
@@ -261,9 +263,8 @@ class Viewer {
     redraw_ = false;
     const PictureSource source{painted_ ? canvas_.shown() : VK_NULL_HANDLE, canvas_.size(), place_};
     screen_.end(source, ImGui::GetDrawData(), painter_.wait());
-    const Tick& tick = timeline.ticks()[timeline.tick()];
-    window_.setTitle(fmt::format("{} - frame {} - {} - billow", document_->name(), tick.number,
-                                 timeline.playing() ? "playing" : "paused"));
+    title = fmt::format("{} - frame {} - {} - billow", document_->name(), timeline.ticks()[timeline.tick()].number,
+                        timeline.playing() ? "playing" : "paused");
   }
 
   // The picture without panels, to a file that is not there yet.
@@ -301,6 +302,7 @@ class Viewer {
   Painter painter_;
   std::optional<OrbitCamera> camera_;
   VkRect2D place_{};
+  std::array<std::string, kFramesInFlight> titles_;  // of the pictures in flight: the window's tells what it shows
   double last_ = 0;
   int settling_ = kSettling;
   bool redraw_ = true;    // the picture does not show what it should
