@@ -5,7 +5,7 @@ BILLOW_BUILD_PACKAGES=(
   g++ cmake ninja-build pkg-config
   libopenvdb-dev libtbb-dev libblosc-dev libboost-iostreams-dev
   libzstd-dev libxxhash-dev libdraco-dev libfmt-dev libcli11-dev nlohmann-json3-dev libexpected-dev libhwy-dev
-  libvulkan-dev mesa-vulkan-drivers glslang-tools libglm-dev libopenexr-dev libpng-dev
+  libvulkan-dev mesa-vulkan-drivers glslang-tools libglm-dev libopenexr-dev libpng-dev libglfw3-dev libimgui-dev
 )
 
 install_packages() {

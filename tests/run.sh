@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 source samples/packages.sh
 
 install_packages "${BILLOW_BUILD_PACKAGES[@]}" libgtest-dev libbenchmark-dev vulkan-validationlayers ccache \
-  clang clang-format libclang-rt-14-dev python3-jsonschema chromium
+  clang clang-format libclang-rt-14-dev python3-jsonschema chromium xvfb xdotool
 
 export CMAKE_CXX_COMPILER_LAUNCHER=ccache
 export UBSAN_OPTIONS=print_stacktrace=1

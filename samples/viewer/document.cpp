@@ -146,6 +146,7 @@ Checked<std::unique_ptr<Document>> Document::open(const std::string& path, const
     document->request = requestOf(path, document->choice_);
   }
   document->request.method = command::Method::metavoxel;
+  document->request.interpolate = runtime::Interpolation::blend;
   spreadFactors(document->request);
   auto contents = command::Contents::find(document->request);
   if (!contents) return tl::unexpected(contents.error());
@@ -171,6 +172,14 @@ std::string Document::whyNotDirect() const {
   if (!request.effects.empty()) return "effects are drawn by metavoxels";
   if (request.volumes.size() != 1) return "several volumes are drawn by metavoxels";
   return request.volumes[0].transform == command::kIdentity ? "" : "the volume has a transform";
+}
+
+bool Document::hasVelocity() const {
+  const auto& volumes = contents_->volumes();
+  return std::any_of(volumes.begin(), volumes.end(), [](const PlacedVolume& volume) {
+    const auto grids = runtime::withVelocity(*volume.pack, volume.record(), volume.grids);
+    return grids.velocityX != format::kNone || grids.velocityY != format::kNone || grids.velocityZ != format::kNone;
+  });
 }
 
 runtime::DrawInfo Document::describe(bool opaque) const {

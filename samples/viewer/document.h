@@ -46,6 +46,9 @@ class Document {
   runtime::Look lookOf(std::size_t volume) const;
   void resetLook();
 
+  // Whether a volume has velocity grids, which advection needs.
+  bool hasVelocity() const;
+
   // What the panels change; no volume and no effect is added or taken away.
   command::RenderRequest request;
   std::unique_ptr<Timeline> timeline;

@@ -1,5 +1,7 @@
 #include "painter.h"
 
+#include <algorithm>
+
 #include "command.h"
 
 namespace billow::viewer {
@@ -29,12 +31,19 @@ Painter::~Painter() {
 
 Checked<void> Painter::show(const Document& document) {
   check(vkDeviceWaitIdle(device()), "vkDeviceWaitIdle");
-  frames_.clear();
-  player_.reset();
   metavoxels_.reset();
   document_ = &document;
-  player_ = std::make_unique<Player>(*renderer_, document.contents(), gpuBudget_ / 2, kFramesInFlight);
+  makePlayer();
   return remakeSpace(document);
+}
+
+// Frames have velocities or not: with another way to play come other frames.
+void Painter::makePlayer() {
+  check(vkDeviceWaitIdle(device()), "vkDeviceWaitIdle");
+  drawables_.clear();
+  player_.reset();
+  player_ = std::make_unique<Player>(*renderer_, document_->contents(), gpuBudget_ / 2, kFramesInFlight,
+                                     document_->request.interpolate);
 }
 
 Checked<void> Painter::remakeSpace(const Document& document) {
@@ -54,24 +63,27 @@ Checked<void> Painter::remakeSpace(const Document& document) {
   return {};
 }
 
-Checked<void> Painter::update(double time, double velocity) {
-  auto frames = player_->update(time, velocity);
-  if (!frames) return tl::unexpected(frames.error());
-  frames_ = std::move(*frames);
+void Painter::update(double time, double velocity) {
+  if (player_->interpolation() != document_->request.interpolate) makePlayer();
+  drawables_ = player_->update(time, velocity);
   time_ = time;
-  return {};
 }
 
 command::Shown Painter::shownIn(runtime::DrawInfo& draw) const {
   command::Shown shown;
-  for (std::size_t i = 0; i < frames_.size(); ++i) {
-    if (frames_[i] == nullptr) continue;
+  for (std::size_t i = 0; i < drawables_.size(); ++i) {
+    const runtime::Drawable& drawable = drawables_[i];
+    if (drawable.count == 0) continue;
     const command::PlacedVolume& volume = document_->contents().volumes()[i];
-    shown.volumes.push_back(command::placed(document_->request, volume, frames_[i], draw.look));
+    const std::span<const runtime::Layer> layers(drawable.layers.data(), drawable.count);
+    shown.volumes.push_back(command::placed(document_->request, volume, layers, draw.look));
   }
   shown.effects = document_->contents().effectsAt(time_);
   if (direct(shown)) {
-    draw.frame = shown.volumes[0].frame;
+    const auto& layers = shown.volumes[0].layers;
+    const auto most = std::max_element(layers.begin(), layers.end(),
+                                       [](const auto& a, const auto& b) { return a.weight < b.weight; });
+    draw.frame = most->frame;
     draw.look = shown.volumes[0].look;
   }
   return shown;

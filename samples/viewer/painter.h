@@ -35,7 +35,9 @@ class Painter {
   Checked<void> remakeSpace(const Document& document);
 
   // Brings the frames of this moment onto the device. Once a picture, before paint().
-  Checked<void> update(double time, double velocity);
+  void update(double time, double velocity);
+  // What could not be loaded, each once.
+  std::optional<std::string> takeError() { return player_->takeError(); }
   bool waiting() const { return player_ && player_->waiting(); }
   Residency residency() const { return player_->residency(); }
 
@@ -55,6 +57,7 @@ class Painter {
   Checked<headless::Picture> picture(runtime::DrawInfo draw);
 
  private:
+  void makePlayer();
   // What there is to draw now. Of the direct method's draw frame and look are filled in.
   command::Shown shownIn(runtime::DrawInfo& draw) const;
   bool direct(const command::Shown& shown) const;
@@ -67,7 +70,7 @@ class Painter {
   const Document* document_ = nullptr;
   std::optional<command::MetavoxelPainter> metavoxels_;
   std::unique_ptr<Player> player_;
-  std::vector<const runtime::Frame*> frames_;  // of the moment
+  std::vector<runtime::Drawable> drawables_;  // of the moment, by volume
   double time_ = 0;
   QueryPool queries_;
   std::array<bool, kFramesInFlight> timed_{};   // whether the slot's queries were written

@@ -4,6 +4,7 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <array>
 
 namespace billow::viewer {
 namespace {
@@ -40,7 +41,8 @@ void setStyle() {
   style.WindowRounding = 0;
   style.FrameRounding = style.GrabRounding = style.PopupRounding = 3;
   style.WindowBorderSize = 0;
-  style.ItemSpacing = {6, 5};
+  style.FramePadding = {4, 2};
+  style.ItemSpacing = {6, 4};
   style.Colors[ImGuiCol_WindowBg] = {0.10f, 0.10f, 0.11f, 1};
   style.Colors[ImGuiCol_FrameBg] = {0.18f, 0.18f, 0.20f, 1};
   style.Colors[ImGuiCol_FrameBgHovered] = {0.24f, 0.24f, 0.27f, 1};
@@ -161,6 +163,21 @@ void Panels::drawCamera(OrbitCamera& camera, Asked& asked) {
   exr_ = format == 1;
 }
 
+void Panels::drawInterpolation(Document& document, Asked& asked) {
+  constexpr std::array kNames = {"hold", "blend", "advect"};
+  constexpr std::array kWays = {Interpolation::hold, Interpolation::blend, Interpolation::advect};
+  ImGui::SetNextItemWidth(80);
+  if (!ImGui::BeginCombo("##between", kNames[static_cast<std::size_t>(document.request.interpolate)])) return;
+  for (std::size_t i = 0; i < kWays.size(); ++i) {
+    const bool possible = kWays[i] != Interpolation::advect || document.hasVelocity();
+    const ImGuiSelectableFlags flags = possible ? ImGuiSelectableFlags_None : ImGuiSelectableFlags_Disabled;
+    if (!ImGui::Selectable(kNames[i], kWays[i] == document.request.interpolate, flags)) continue;
+    document.request.interpolate = kWays[i];
+    asked.redraw = true;
+  }
+  ImGui::EndCombo();
+}
+
 void Panels::drawBelow(Document& document, const Report& report, Asked& asked) {
   Timeline& timeline = *document.timeline;
   const float width = ImGui::GetContentRegionAvail().x;
@@ -180,8 +197,10 @@ void Panels::drawBelow(Document& document, const Report& report, Asked& asked) {
     ImGui::EndCombo();
   }
   ImGui::SameLine();
+  drawInterpolation(document, asked);
+  ImGui::SameLine();
   auto speed = static_cast<float>(timeline.speed());
-  ImGui::SetNextItemWidth(std::clamp(width - 420, 60.0f, 200.0f));
+  ImGui::SetNextItemWidth(std::clamp(width - 500, 60.0f, 200.0f));
   const auto most = static_cast<float>(kMostSpeed);
   if (ImGui::SliderFloat("##speed", &speed, -most, most, "%.2f x", ImGuiSliderFlags_AlwaysClamp)) {
     timeline.setSpeed(double{speed});
@@ -190,7 +209,7 @@ void Panels::drawBelow(Document& document, const Report& report, Asked& asked) {
   const Tick& tick = timeline.ticks()[timeline.tick()];
   const std::string text = fmt::format("frame {}   {:.2f} / {:.2f} s", tick.number, timeline.time(), timeline.end());
   const float room = width - ImGui::CalcTextSize(text.c_str()).x;
-  if (width > 420) {
+  if (width > 540) {
     ImGui::SameLine(std::max(room, 0.0f));
     ImGui::AlignTextToFramePadding();
     ImGui::TextUnformatted(text.c_str());

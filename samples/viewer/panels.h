@@ -64,6 +64,7 @@ class Panels {
   void drawLight(Document& document, Asked& asked);
   void drawDrawing(Document& document, const Report& report, Asked& asked);
   void drawCamera(OrbitCamera& camera, Asked& asked);
+  void drawInterpolation(Document& document, Asked& asked);
   void drawBelow(Document& document, const Report& report, Asked& asked);
   void drawErrors();
   void drawMessage();

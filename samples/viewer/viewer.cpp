@@ -248,8 +248,8 @@ class Viewer {
     std::string& title = titles_[screen_.slot()];
     if (!title.empty()) window_.setTitle(title);
     const Timeline& timeline = *document_->timeline;
-    const auto arrived = painter_.update(timeline.time(), timeline.velocity());
-    if (!arrived) panels_.complain(arrived.error().message);
+    painter_.update(timeline.time(), timeline.velocity());
+    while (const auto error = painter_.takeError()) panels_.complain(*error);
     if (shoot_) shoot();
     if (redraw_) {
       const auto done = painter_.paint(commands, canvas_, describe(true), screen_.slot());

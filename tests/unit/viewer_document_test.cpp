@@ -130,7 +130,7 @@ TEST_F(ViewerDocument, CopiedMembersDrawTheSame) {
   EXPECT_EQ(a.sun.irradiance, b.sun.irradiance);
   const auto lookOf = [](const Document& from) {
     const command::PlacedVolume& volume = from.contents().volumes()[0];
-    return command::placed(from.request, volume, nullptr, from.describe(true).look).look;
+    return command::placed(from.request, volume, {}, from.describe(true).look).look;
   };
   const runtime::Look first = lookOf(*document), second = lookOf(*again);
   EXPECT_FLOAT_EQ(first.extinctionScale, second.extinctionScale);
