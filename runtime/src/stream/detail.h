@@ -14,19 +14,20 @@ namespace billow::runtime {
 // What planning knows of an item.
 struct PlannedItem {
   const ResidentFrame* frame = nullptr;  // while it is resident; the frame thread's
-  std::uint64_t bytes = 0;   // on the device: what it takes, or may take at most; 0: not asked yet
-  std::uint64_t ticket = 0;  // of its load; 0: none
-  std::uint64_t marked = 0;  // the pass in which it was counted last
-  std::uint64_t wanted = 0;  // the pass in which it was wanted last
-  std::uint64_t drawn = 0;   // the pass in which an instance drew it last
-  std::uint32_t want = 0;    // its place in the pass's list
-  std::uint32_t place = 0;   // among the residents
-  double used = 0;           // seconds, when it was wanted last
+  std::uint64_t bytes = 0;               // on the device: what it takes, or may take at most; 0: not asked yet
+  std::uint64_t ticket = 0;              // of its load; 0: none
+  std::uint64_t marked = 0;              // the pass in which it was counted last
+  std::uint64_t wanted = 0;              // the pass in which it was wanted last
+  std::uint64_t drawn = 0;               // the pass in which an instance drew it last
+  std::uint32_t want = 0;                // its place in the pass's list
+  std::uint32_t place = 0;               // among the residents
+  double used = 0;                       // seconds, when it was wanted last
   double retryAt = 0;
   float backOff = 0;  // seconds; 0: nothing failed
   bool resident = false;
   bool leaving = false;   // the frame thread was asked to give it back
   bool corrupt = false;   // will never come
+  bool moving = false;    // it lies in memory that must go, and is drawn: to be loaded anew
   bool velocity = false;  // resident with the grids that Interpolation::advect needs
   bool scratch = false;   // its load waits for memory of the CPU
 };

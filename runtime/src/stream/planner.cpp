@@ -5,18 +5,19 @@
 namespace billow::runtime {
 void Planner::pass(Snapshot& snapshot, std::vector<Change>& changes, std::vector<StreamError>& errors) {
   ++passes_;
-  shrunk_ = shrunk_ || snapshot.gpuBudget < budget_;
+  if (snapshot.gpuBudget < budget_) shrunkFrom_ = snapshot.update;
   budget_ = snapshot.gpuBudget;
   takeNotices(snapshot, changes);
   takeArrivals(snapshot.now, changes, errors);
   markDrawn(snapshot);
+  measureSlack();
   findVelocity(snapshot);
   detail_.choose(snapshot, clips_, transport_, passes_, changes);
   gather(snapshot);
   fit();
   cancelUnwanted(snapshot.now);
   makeRoom(snapshot, changes);
-  leaveBlocks(changes);
+  leaveBlocks(snapshot, changes);
   order(snapshot);
   forceRoom(snapshot, changes);
   count(snapshot.now);
@@ -31,13 +32,14 @@ void Planner::findVelocity(const Snapshot& snapshot) {
 }
 
 void Planner::fit() {
+  const std::uint64_t room = budget_ - std::min(slack_, budget_);
   std::uint64_t sum = 0;
   bool full = false;
   for (Want& want : wants_) {
     const std::uint64_t bytes = bytesOf(transport_, clips_[want.clip], want.item);
     // What comes later may not take the room of what comes sooner and is larger.
     if (full && want.tier >= kSoon) continue;
-    want.fits = bytes <= budget_ - std::min(sum, budget_);
+    want.fits = bytes <= room - std::min(sum, room);
     if (want.fits) sum += bytes;
     full = full || !want.fits;
   }
@@ -47,7 +49,7 @@ bool Planner::absent(const Want& want, double now) const {
   const PlannedClip& clip = clips_[want.clip];
   const Item& item = clip.items[want.item];
   if (item.ticket != 0 || item.leaving || item.corrupt || item.retryAt > now) return false;
-  return !item.resident || (clip.velocity && !item.velocity);
+  return !item.resident || item.moving || (clip.velocity && clip.clip->velocity && !item.velocity);
 }
 
 std::uint64_t Planner::bytesToLoad(const Want& want) {

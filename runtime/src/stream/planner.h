@@ -94,7 +94,8 @@ class Planner {
   std::uint64_t roomNeeded(double now);
   void findVictims(const Snapshot& snapshot);
   void forceRoom(const Snapshot& snapshot, std::vector<Change>& changes);
-  void leaveBlocks(std::vector<Change>& changes);
+  void leaveBlocks(const Snapshot& snapshot, std::vector<Change>& changes);
+  void measureSlack();
   void evict(std::uint32_t clip, std::uint32_t item, Change::Kind kind, std::vector<Change>& changes);
 
   // planner.cpp: what is ordered
@@ -121,9 +122,10 @@ class Planner {
   std::uint64_t passes_ = 0;
   std::uint64_t nextTicket_ = 1;
   std::uint64_t budget_ = 0;
-  bool shrunk_ = false;  // the budget did, and frames may lie in memory that must go
-  std::uint64_t resident_ = 0;  // bytes, without what the frame thread was asked to give back
-  std::uint64_t asked_ = 0;     // bytes of that
+  std::uint64_t slack_ = 0;                  // bytes of the budget that lie in gaps too small for what is loading
+  std::optional<std::uint64_t> shrunkFrom_;  // the update since which frames lie in memory that must go
+  std::uint64_t resident_ = 0;               // bytes, without what the frame thread was asked to give back
+  std::uint64_t asked_ = 0;                  // bytes of that
   std::uint64_t loading_ = 0;
   double latency_ = 0;                        // seconds from order to arrival, of late
   std::optional<std::uint64_t> blockedFrom_;  // the update since which something of now has no room

@@ -36,7 +36,7 @@ void Planner::setAbsent(std::uint32_t clip, std::uint32_t number) {
   residents_[item.place] = moved;
   clips_[moved.clip].items[moved.item].place = item.place;
   residents_.pop_back();
-  item.resident = item.leaving = item.velocity = false;
+  item.resident = item.leaving = item.velocity = item.moving = false;
   item.bytes = 0;
   item.frame = nullptr;
 }

@@ -83,15 +83,31 @@ void Planner::makeRoom(const Snapshot& snapshot, std::vector<Change>& changes) {
   }
 }
 
-// Memory goes back to the device in blocks: after the budget shrank, frames in those that go are loaded anew elsewhere.
-void Planner::leaveBlocks(std::vector<Change>& changes) {
-  if (!shrunk_) return;
-  shrunk_ = false;
+// Memory goes back to the device in blocks: after the budget shrank, frames in those that go are loaded anew elsewhere,
+// drawn ones before they leave, if there is room.
+void Planner::leaveBlocks(const Snapshot& snapshot, std::vector<Change>& changes) {
+  if (!shrunkFrom_) return;
+  bool found = false;
   for (const Resident& resident : residents_) {
-    const Item& item = clips_[resident.clip].items[resident.item];
-    if (item.leaving || item.ticket != 0 || !transport_.mustLeave(*item.frame)) continue;
-    shrunk_ = true;
-    evict(resident.clip, resident.item, Change::Kind::evict, changes);
+    Item& item = clips_[resident.clip].items[resident.item];
+    if (item.leaving || !transport_.mustLeave(*item.frame)) continue;
+    found = true;
+    const bool late = snapshot.update >= *shrunkFrom_ + kNoPatience;
+    if (item.ticket != 0) continue;
+    item.moving = item.drawn == passes_;
+    if (item.moving && !late) continue;
+    evict(resident.clip, resident.item, late ? Change::Kind::force : Change::Kind::evict, changes);
+  }
+  if (!found && snapshot.update > *shrunkFrom_) shrunkFrom_.reset();
+}
+
+// Frames are of all sizes, and the gaps between them are not always where they are needed.
+void Planner::measureSlack() {
+  const std::uint64_t stuck = transport_.wantedGpuBytes();
+  if (stuck > leavingBytes()) {
+    slack_ = std::min(slack_ + stuck / 4 + 1, budget_ / 2);
+  } else {
+    slack_ -= (slack_ + 255) / 256;
   }
 }
 

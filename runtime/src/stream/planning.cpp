@@ -14,29 +14,6 @@ void moveOver(std::vector<T>& from, std::vector<T>& to) {
 
 }  // namespace
 
-bool OpenJobs::begin() {
-  const std::lock_guard lock(mutex_);
-  if (!stopped_) ++running_;
-  return !stopped_;
-}
-
-void OpenJobs::end() {
-  const std::lock_guard lock(mutex_);
-  // Under the lock: the one who waits may destroy this as soon as it sees none.
-  if (--running_ == 0) ended_.notify_all();
-}
-
-void OpenJobs::stop() {
-  std::unique_lock lock(mutex_);
-  stopped_ = true;
-  ended_.wait(lock, [this] { return running_ == 0; });
-}
-
-void OpenJobs::start() {
-  const std::lock_guard lock(mutex_);
-  stopped_ = false;
-}
-
 void Planning::start(Transport& transport, const StreamConfig& config) {
   planner_ = std::make_unique<Planner>(transport, config);
   {

@@ -13,21 +13,6 @@
 
 namespace billow::runtime {
 
-// Packs that are being opened on other threads. None begins after stop(), which waits for those that run.
-class OpenJobs {
- public:
-  bool begin();
-  void end();
-  void stop();
-  void start();
-
- private:
-  std::mutex mutex_;
-  std::condition_variable ended_;
-  std::uint32_t running_ = 0;
-  bool stopped_ = true;
-};
-
 // Where passes are made.
 enum class PlanOn {
   thread,

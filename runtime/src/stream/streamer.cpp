@@ -8,7 +8,7 @@
 
 #include "api.h"
 #include "checks.h"
-#include "opening.h"
+#include "openings.h"
 #include "planning.h"
 #include "players.h"
 
@@ -27,12 +27,6 @@ struct Asset {
   bool told = false;  // of an error in it
   std::optional<Opened> next;
   std::vector<std::uint32_t> nextClips;
-};
-
-struct OpenDone {
-  AssetId asset = {};
-  bool reload = false;
-  Result<Opened> opened;
 };
 
 const char* badField(const StreamConfig& config) {
@@ -65,9 +59,9 @@ class StreamerImpl final : public Streamer {
       return failure(ErrorCode::budget, "the tables of the open packs do not fit into the CPU budget");
     }
     transport_ = std::move(*transport);
+    openings_.start(*transport_);
     planning_.start(*transport_, config_);
     before_ = transport_->stats();
-    jobs_.start();
     return {};
   }
 
@@ -75,8 +69,7 @@ class StreamerImpl final : public Streamer {
     return guarded<AssetId>([&]() -> Result<AssetId> {
       if (auto fits = checkSource(source); !fits) return tl::unexpected(fits.error());
       const AssetId id{nextAsset_++};
-      auto opened =
-          source.source != nullptr ? openHere(source.source, id) : openFile(source.path, id, Reserve{*transport_});
+      auto opened = openings_.openHere(source, id);
       if (!opened) return tl::unexpected(opened.error());
       assets_[id.value].id = id;
       begin(assets_[id.value], std::move(*opened));
@@ -90,7 +83,7 @@ class StreamerImpl final : public Streamer {
       if (auto fits = checkSource(source); !fits) return tl::unexpected(fits.error());
       const AssetId id{nextAsset_++};
       assets_[id.value].id = id;
-      startOpening(source, id, false);
+      openings_.openLater(source, id, false);
       return id;
     });
   }
@@ -114,7 +107,7 @@ class StreamerImpl final : public Streamer {
       if (asset.reloading) return failure(ErrorCode::argument, "reload: the asset is being reloaded");
       asset.reloading = true;
       asset.told = false;
-      startOpening(source, id, true);
+      openings_.openLater(source, id, true);
       return {};
     });
   }
@@ -192,15 +185,6 @@ class StreamerImpl final : public Streamer {
   }
 
  private:
-  // A pack on its way: read on another thread, then found by update().
-  struct Opening {
-    StreamerImpl& self;
-    AssetId asset;
-    bool reload;
-    std::string path;
-    std::unique_ptr<TableReader> reader;
-  };
-
   static void wake(void* self) { static_cast<StreamerImpl*>(self)->planning_.request(); }
 
   static std::string nameOf(const PackSource& source) {
@@ -225,44 +209,6 @@ class StreamerImpl final : public Streamer {
       return failure(ErrorCode::argument, "StreamConfig: without readThreads packs come from sources alone");
     }
     return {};
-  }
-
-  // On the calling thread, which waits.
-  Result<Opened> openHere(const std::shared_ptr<AsyncSource>& source, AssetId id) {
-    std::mutex mutex;
-    std::condition_variable came;
-    bool done = false;
-    const auto reader = TableReader::make(source, id, Reserve{*transport_}, [&] {
-      const std::lock_guard lock(mutex);
-      done = true;
-      came.notify_all();
-    });
-    reader->start();
-    std::unique_lock lock(mutex);
-    came.wait(lock, [&] { return done; });
-    return reader->open();
-  }
-
-  void startOpening(const PackSource& source, AssetId id, bool reload) {
-    if (!jobs_.begin()) return;
-    auto* opening = new Opening{*this, id, reload, source.path, nullptr};
-    if (source.source == nullptr) return transport_->run(&finishOpening, opening);
-    opening->reader = TableReader::make(source.source, id, Reserve{*transport_},
-                                        [this, opening] { transport_->run(&finishOpening, opening); });
-    opening->reader->start();
-  }
-
-  static void finishOpening(void* context) {
-    const std::unique_ptr<Opening> opening(static_cast<Opening*>(context));
-    StreamerImpl& self = opening->self;
-    auto opened = opening->reader != nullptr ? opening->reader->open()
-                                             : openFile(opening->path, opening->asset, Reserve{*self.transport_});
-    opening->reader.reset();
-    {
-      const std::lock_guard lock(self.openMutex_);
-      self.opened_.push_back({opening->asset, opening->reload, std::move(opened)});
-    }
-    self.jobs_.end();
   }
 
   std::vector<std::uint32_t> openClips(const Opened& opened) {
@@ -292,12 +238,9 @@ class StreamerImpl final : public Streamer {
   }
 
   void takeOpened() {
-    std::vector<OpenDone> opened;
-    {
-      const std::unique_lock lock(openMutex_, std::try_to_lock);
-      if (lock) opened.swap(opened_);
-    }
-    for (OpenDone& done : opened) takeOpened(done);
+    openings_.take(opened_);
+    for (OpenDone& done : opened_) takeOpened(done);
+    opened_.clear();
   }
 
   void takeOpened(OpenDone& done) {
@@ -434,7 +377,7 @@ class StreamerImpl final : public Streamer {
   // Everything on the device is given back, or is about to be with the transport.
   void drop() {
     if (transport_ == nullptr) return;
-    jobs_.stop();
+    openings_.stop();
     takeOpened();
     planning_.stop();
     changes_.clear();
@@ -448,8 +391,8 @@ class StreamerImpl final : public Streamer {
 
   StreamConfig config_;
   MakeTransport make_;
-  OpenJobs jobs_;
   std::unique_ptr<Transport> transport_;
+  Openings openings_;
   Planning planning_;
   Players players_;
   std::map<std::uint32_t, Asset> assets_;
@@ -459,6 +402,7 @@ class StreamerImpl final : public Streamer {
   // Scratch of update().
   std::vector<Change> changes_;
   std::vector<StreamError> met_;
+  std::vector<OpenDone> opened_;
   Snapshot snapshot_;
   PlanStats plan_;
   TransportStats before_;
@@ -466,8 +410,6 @@ class StreamerImpl final : public Streamer {
   std::uint32_t loadedBefore_ = 0;
   StreamStats stats_;
   std::deque<StreamError> errors_;
-  std::mutex openMutex_;
-  std::vector<OpenDone> opened_;  // by openMutex_
 };
 
 }  // namespace

@@ -86,7 +86,9 @@ struct StreamConfig {
   // The staging ring, bytes in flight from the disk, scratch memory, and tables of open packs. Never exceeded.
   std::uint64_t cpuBudget = std::uint64_t{64} << 20;
   std::uint64_t stagingBytes = std::uint64_t{8} << 20;  // the ring's size, at least 64 KiB
-  std::uint32_t threads = 2;                            // of billow's that decompress; 0: `jobs` does all of it
+  // Of billow's that decompress; 0: `jobs` does all of it. One more thread plans: it sleeps but for some tens of
+  // microseconds an update().
+  std::uint32_t threads = 2;
   std::uint32_t readThreads = 1;  // of billow's that read files; 0: packs come from AsyncSources alone
   JobSystem jobs = {};
   Allocator allocator = {};
@@ -96,7 +98,8 @@ struct StreamConfig {
   std::uint32_t framesInFlight = 3;
   Verify verify = Verify::once;
   Submission submission = Submission::inUpdate;
-  double prefetchSeconds = 0.25;  // how far ahead of what is drawn is loaded, real time
+  // How far ahead of what is drawn is loaded, real time, beyond the time that a load takes; 0 to 60.
+  double prefetchSeconds = 0.25;
 };
 
 // Handles stay unequal after what they named is gone.
@@ -196,7 +199,8 @@ class Streamer {
   virtual ~Streamer() = default;
 
   // Reads and checks the pack's tables on the calling thread, which is for loading screens, or on another one:
-  // openLater() returns at once, and state() tells. An AsyncSource is always read on another thread's behalf.
+  // openLater() returns at once, and state() tells after the update() that finds it open. An AsyncSource is always read
+  // on another thread's behalf.
   virtual Result<AssetId> open(const PackSource& source) = 0;
   virtual Result<AssetId> openLater(const PackSource& source) = 0;
   enum class AssetState { opening, ready, failed, unknown };
