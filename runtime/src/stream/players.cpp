@@ -230,7 +230,9 @@ bool Players::succeed(AssetId asset) {
 
 bool Players::successorFailed(AssetId asset) const {
   return std::any_of(views_.begin(), views_.end(), [&](const InstanceView& view) {
-    if (tracks_[view.clip].clip->asset != asset || view.successor == format::kNone) return false;
+    if (tracks_[view.clip].clip->asset != asset) return false;
+    // It was added meanwhile, and plays a volume that is no more.
+    if (view.successor == format::kNone) return true;
     return !visitSuccessor(tracks_, view,
                            [](const Track& track, std::uint32_t frame) { return !allFailed(track, frame); });
   });
