@@ -108,6 +108,18 @@ class Measurement {
     }
   }
 
+  // Whether a cell's value is that of all cells around, in tiles.
+  bool isInside(const Origin& cell, float value) const {
+    for (std::int32_t n = 0; n < 27; ++n) {
+      const Tile* tile =
+          level_.tileOver({cell[0] + 8 * (n / 9 - 1), cell[1] + 8 * (n / 3 % 3 - 1), cell[2] + 8 * (n % 3 - 1)}, 8);
+      if (tile == nullptr || std::bit_cast<std::uint32_t>(tile->value) != std::bit_cast<std::uint32_t>(value)) {
+        return false;
+      }
+    }
+    return true;
+  }
+
   // The rest of a tile, where no other value is within reach.
   void addInterior(const Tile& tile) {
     const std::size_t side = tile.dim / 8;
@@ -138,6 +150,9 @@ class Measurement {
 
   Part measureCell(const Origin& cell) const {
     Part part;
+    if (const Tile* tile = level_.tileOver(cell, 8); tile != nullptr && isInside(cell, tile->value)) {
+      return measureConstant(cell, tile->value);
+    }
     Apron apron;
     if (gather(cell, apron)) measureBricks(fineOrigin(cell), apron, part);
     return part;
