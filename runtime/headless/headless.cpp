@@ -11,6 +11,15 @@
 namespace billow::headless {
 namespace {
 
+// What all of a draw's frames are uploaded at.
+std::uint64_t uploadValueOf(const runtime::Frame* frame, std::span<const runtime::Layer> layers) {
+  std::uint64_t value = frame != nullptr ? frame->uploadValue() : 0;
+  for (const runtime::Layer& layer : layers) {
+    if (layer.frame != nullptr) value = std::max(value, layer.frame->uploadValue());
+  }
+  return value;
+}
+
 float halfToFloat(std::uint16_t half) {
   const float sign = (half & 0x8000u) != 0 ? -1.0f : 1.0f;
   const int exponent = half >> 10 & 31;
@@ -216,7 +225,7 @@ class HeadlessImpl final : public Headless {
   static std::uint64_t uploadOf(const runtime::MetavoxelDraw& draw) {
     std::uint64_t value = 0;
     for (const runtime::MetavoxelVolume& volume : draw.volumes) {
-      if (volume.frame != nullptr) value = std::max(value, volume.frame->uploadValue());
+      value = std::max(value, uploadValueOf(volume.frame, volume.layers));
     }
     return value;
   }
