@@ -14,8 +14,25 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Qu
 layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer PairArray { uvec2 items[]; };
 layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer WordArray { uint items[]; };
 
-layout(set = 0, binding = 0, std140) uniform ParamsBlock { MarchParams params; };
+// Where several layers are drawn at once, `layerNow` is the one whose grids and bricks are read.
 layout(set = 0, binding = 1) uniform texture3D atlasBc7;
+#ifdef BILLOW_LAYERS
+layout(constant_id = 4) const uint kLayers = 2;
+layout(set = 0, binding = 0, std140) uniform ParamsBlock {
+  MarchParams params;
+  LayerParams layers[kLayerCount];
+};
+layout(set = 0, binding = 4) uniform texture3D atlasOfSecond;
+layout(set = 0, binding = 5) uniform texture3D atlasOfThird;
+layout(set = 0, binding = 6) uniform texture3D atlasOfFourth;
+uint layerNow = 0u;
+#define BILLOW_GRID(g) layers[layerNow].grids[g]
+#define BILLOW_BRICKS layers[layerNow].bricks
+#else
+layout(set = 0, binding = 0, std140) uniform ParamsBlock { MarchParams params; };
+#define BILLOW_GRID(g) params.grids[g]
+#define BILLOW_BRICKS params.bricks
+#endif
 
 bool hasGrid(uint slot) { return (kGrids >> slot & 1u) != 0u; }
 

@@ -16,7 +16,7 @@ struct Record {
 };
 
 Record loadRecord(uint g, uint number) {
-  const uvec4 words = QuadArray(params.grids[g].tableAndRecords.zw).items[number - 1u];
+  const uvec4 words = QuadArray(BILLOW_GRID(g).tableAndRecords.zw).items[number - 1u];
   return Record(words.x, words.y, uintBitsToFloat(words.z), uintBitsToFloat(words.w));
 }
 
@@ -44,20 +44,31 @@ uint storedCorners(uint encoding, uint bits) {
 }
 
 ivec3 atlasCorner(uint slot) {
-  const uint xBits = params.bricks.x & 0xffu;
-  const uint yBits = params.bricks.x >> 8;
+  const uint xBits = BILLOW_BRICKS.x & 0xffu;
+  const uint yBits = BILLOW_BRICKS.x >> 8;
   const uvec3 at = uvec3(slot & ((1u << xBits) - 1u), slot >> xBits & ((1u << yBits) - 1u), slot >> (xBits + yBits));
   return ivec3(at) * ivec3(8, 8, 2);
 }
 
+#ifdef BILLOW_LAYERS
+vec4 atlasTexel(ivec3 at) {
+  if (kLayers > 1u && layerNow == 1u) return texelFetch(atlasOfSecond, at, 0);
+  if (kLayers > 2u && layerNow == 2u) return texelFetch(atlasOfThird, at, 0);
+  if (kLayers > 3u && layerNow == 3u) return texelFetch(atlasOfFourth, at, 0);
+  return texelFetch(atlasBc7, at, 0);
+}
+#else
+vec4 atlasTexel(ivec3 at) { return texelFetch(atlasBc7, at, 0); }
+#endif
+
 vec4 nearestInteger(vec4 texel) { return floor(texel * 255.0 + 0.5); }
 
 vec4 bc7Slab(ivec3 at, uint channel) {
-  const vec4 near = texelFetch(atlasBc7, at, 0);
-  const vec4 far = texelFetch(atlasBc7, at + ivec3(0, 1, 0), 0);
+  const vec4 near = atlasTexel(at);
+  const vec4 far = atlasTexel(at + ivec3(0, 1, 0));
   if (channel < 3u) return nearestInteger(vec4(near[channel], near[channel + 1u], far[channel], far[channel + 1u]));
-  const float nearNext = texelFetch(atlasBc7, at + ivec3(0, 0, 1), 0).r;
-  const float farNext = texelFetch(atlasBc7, at + ivec3(0, 1, 1), 0).r;
+  const float nearNext = atlasTexel(at + ivec3(0, 0, 1)).r;
+  const float farNext = atlasTexel(at + ivec3(0, 1, 1)).r;
   return nearestInteger(vec4(near.a, nearNext, far.a, farNext));
 }
 
@@ -75,7 +86,7 @@ uint firstIndexWord(uint encoding, uint slot) { return slot * 8u + (isLocal(enco
 
 // The indices of a voxel and of the next along z.
 uvec2 indexPair(uint firstWord, uint bits, uint voxel) {
-  WordArray words = WordArray(params.bricks.zw);
+  WordArray words = WordArray(BILLOW_BRICKS.zw);
   const uint bit = voxel * bits;
   const uint at = firstWord + (bit >> 5);
   const uint shift = bit & 31u;
@@ -92,7 +103,7 @@ uvec4 localTexels(uvec4 ends, uvec4 index, uint bits) {
 }
 
 uvec4 localSlab(uint slot, uvec3 v, uvec4 index, uint bits) {
-  const uvec4 cells = QuadArray(params.bricks.zw).items[slot * 2u + (v.x >> 2)];
+  const uvec4 cells = QuadArray(BILLOW_BRICKS.zw).items[slot * 2u + (v.x >> 2)];
   const uvec2 near = v.y < 4u ? cells.xy : cells.zw;
   const uvec2 far = v.y < 3u ? cells.xy : cells.zw;
   const uvec4 ends = uvec4(cellEnds(near, v.z), cellEnds(near, v.z + 1u), cellEnds(far, v.z), cellEnds(far, v.z + 1u));
@@ -110,7 +121,7 @@ uvec4 indexSlab(uint encoding, uint slot, uvec3 v) {
 
 // Sixteen times the rows of four values, interpolated at (x, y): z 0 and 2 in the halves of .x, 1 and 3 in those of .y.
 uvec2 coarseRow(uint slot, uint x, uint y) {
-  WordArray words = WordArray(params.bricks.zw);
+  WordArray words = WordArray(BILLOW_BRICKS.zw);
   uvec2 sum = uvec2(0u);
   for (uint tap = 0u; tap < 4u; ++tap) {
     const ivec2 upper = ivec2(tap >> 1, tap & 1u);
@@ -141,7 +152,7 @@ uvec4 coarseSlab(uint slot, uvec3 v) {
 
 bool maskBit(uint g, uint mask, uvec3 v) {
   const uint bit = v.x << 6 | v.y << 3 | v.z;
-  return (WordArray(params.grids[g].masksAndNode4.xy).items[mask * 16u + (bit >> 5)] >> (bit & 31u) & 1u) != 0u;
+  return (WordArray(BILLOW_GRID(g).masksAndNode4.xy).items[mask * 16u + (bit >> 5)] >> (bit & 31u) & 1u) != 0u;
 }
 
 // The stored integer of voxel v (each component 0 to 7); `index` is not changed where the encoding has none.
@@ -151,13 +162,13 @@ float voxelTexel(Record record, uvec3 v, inout uint index) {
   if (encoding == kEncodingConstant) return 0.0;
   if (encoding <= kEncodingBc7X) {
     const uvec3 s = storedOrder(encoding, v);
-    return nearestInteger(texelFetch(atlasBc7, atlasCorner(slot) + ivec3(s.xy, s.z >> 2), 0))[s.z & 3u];
+    return nearestInteger(atlasTexel(atlasCorner(slot) + ivec3(s.xy, s.z >> 2)))[s.z & 3u];
   }
   if (encoding == kEncodingCoarse) return float(coarseTexel(coarseRow(slot, v.x, v.y), v.z));
   const uint bits = indexBits(encoding);
   index = indexPair(firstIndexWord(encoding, slot), bits, v.x << 6 | v.y << 3 | v.z).x;
   if (!isLocal(encoding)) return float(index);
-  const uvec2 cells = PairArray(params.bricks.zw).items[slot * 4u + (v.x >> 2) * 2u + (v.y >> 2)];
+  const uvec2 cells = PairArray(BILLOW_BRICKS.zw).items[slot * 4u + (v.x >> 2) * 2u + (v.y >> 2)];
   return float(localTexels(uvec4(cellEnds(cells, v.z)), uvec4(index), bits).x);
 }
 
@@ -167,7 +178,7 @@ float recordVoxel(uint g, Record record, uvec3 v) {
   bool present = true;
   if (record.mask == kMaskTexel) present = index != 0u;
   if (record.mask < kMaskTexel) present = maskBit(g, record.mask, v);
-  if (!present) return params.grids[g].boxMin.w;
+  if (!present) return BILLOW_GRID(g).boxMin.w;
   precise const float product = record.scale * texel;
   precise const float value = record.lo + product;
   return value;
@@ -199,13 +210,28 @@ uint maskSlab(uvec2 words, uvec3 v) {
 }
 
 uint maskCorners(uint g, uint mask, uvec3 v) {
-  PairArray masks = PairArray(params.grids[g].masksAndNode4.xy);
+  PairArray masks = PairArray(BILLOW_GRID(g).masksAndNode4.xy);
   return maskSlab(masks.items[mask * 8u + v.x], v) | maskSlab(masks.items[mask * 8u + v.x + 1u], v) << 4;
 }
 
 uint nonZero(uvec4 index) {
   const uvec4 bits = min(index, uvec4(1u));
   return bits.x | bits.y << 1 | bits.z << 2 | bits.w << 3;
+}
+
+// The weights of those corners that are active.
+float activeWeight(uint g, Record record, uvec3 v, Weights w) {
+  if (record.mask == kMaskAll) return totalWeight(w);
+  uint present = 0u;
+  if (record.mask < kMaskTexel) {
+    present = maskCorners(g, record.mask, v);
+  } else {  // such bricks have indices
+    const uint slot = slotOf(record);
+    present = nonZero(indexSlab(encodingOf(record), slot, v)) |
+              nonZero(indexSlab(encodingOf(record), slot, v + uvec3(1, 0, 0))) << 4;
+  }
+  const uvec4 bits = uvec4(1u, 2u, 4u, 8u);
+  return weighted(vec4(min(present & bits, uvec4(1u))), vec4(min(present >> 4 & bits, uvec4(1u))), w);
 }
 
 // The sum of the corners' values, each times its weights. v is at most 6 along each axis.
@@ -239,7 +265,7 @@ float recordCorners(uint g, Record record, uvec3 v, Weights w) {
     upper = bc7Slab(at + ivec3(1, 0, 0), s.z & 3u);
   }
   if (present == 0xffu) return record.lo * totalWeight(w) + record.scale * weighted(lower, upper, w);
-  const vec4 inactive = vec4(params.grids[g].boxMin.w);
+  const vec4 inactive = vec4(BILLOW_GRID(g).boxMin.w);
   const uvec4 bits = uvec4(1u, 2u, 4u, 8u);
   lower = mix(inactive, record.lo + record.scale * lower, notEqual(present & bits, uvec4(0u)));
   upper = mix(inactive, record.lo + record.scale * upper, notEqual(present >> 4 & bits, uvec4(0u)));

@@ -2,24 +2,26 @@
 #ifndef BILLOW_LIGHT
 #define BILLOW_LIGHT
 
-#include "medium.glsl"
 #include "phase.glsl"
+#ifdef BILLOW_LAYERS
+#include "layers.glsl"
+#else
+#include "frame_matter.glsl"
+#endif
 
 // Share of the sun's light that reaches p (world, relative to the eye), by marching towards the sun. The reference
 // mode; a cached light volume has this signature too.
 float sunTransmittance(vec3 p) {
   if (kShadow == kFilterNone) return 1.0;
-  const uint g = extinctionSlot();
-  const Ray ray = makeRay(g, p, params.sun.xyz);
-  const float exit = crossGrid(g, ray).y;
+  float voxels;
+  const ShadowRay ray = shadowRay(p, voxels);
+  const float exit = ray.exit;
   if (exit <= 0.0) return 1.0;
-  const float wanted = exit * length(ray.direction) / params.albedo.w;
-  const int count = int(clamp(ceil(wanted), 1.0, float(params.size.z)));
+  const int count = int(clamp(ceil(voxels / params.albedo.w), 1.0, float(params.size.z)));
   const float dt = exit / float(count);
   float opticalDepth = 0.0;
   for (int i = 0; i < count; ++i) {
-    const float t = (float(i) + 0.5) * dt;
-    opticalDepth += extinctionOf(sampleGrid(g, ray.origin + ray.direction * t, kShadow)) * dt;
+    opticalDepth += shadowExtinction(ray, (float(i) + 0.5) * dt) * dt;
     if (opticalDepth > 12.0) break;
   }
   return exp(-opticalDepth);

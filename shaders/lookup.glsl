@@ -17,40 +17,40 @@ uint rankedChild(WordArray words, uint maskAt, uint ranksAt, uint bit) {
 }
 
 uint treeNode4(uint g, uvec3 cell) {
-  return rankedChild(WordArray(params.grids[g].tableAndRecords.xy), 0u, 1024u, node5Bit(cell));
+  return rankedChild(WordArray(BILLOW_GRID(g).tableAndRecords.xy), 0u, 1024u, node5Bit(cell));
 }
 
 uint treeChild(uint g, uint node4, uvec3 cell) {
   const uint at = node4 * kTreeNode4Words;
-  return rankedChild(WordArray(params.grids[g].masksAndNode4.zw), at + 2u, at + 130u, node4Bit(cell));
+  return rankedChild(WordArray(BILLOW_GRID(g).masksAndNode4.zw), at + 2u, at + 130u, node4Bit(cell));
 }
 
 uint flatEntry(uint g, ivec3 local) {
-  const ivec3 dim = params.grids[g].cellDim.xyz;
-  return WordArray(params.grids[g].tableAndRecords.xy).items[(local.x * dim.y + local.y) * dim.z + local.z];
+  const ivec3 dim = BILLOW_GRID(g).cellDim.xyz;
+  return WordArray(BILLOW_GRID(g).tableAndRecords.xy).items[(local.x * dim.y + local.y) * dim.z + local.z];
 }
 
 uint findInTree(uint g, uvec3 cell) {
   const uint node4 = treeNode4(g, cell);
-  if (node4 == kNone) return uint(params.grids[g].cellDim.w);
-  WordArray node = WordArray(params.grids[g].masksAndNode4.zw);
+  if (node4 == kNone) return uint(BILLOW_GRID(g).cellDim.w);
+  WordArray node = WordArray(BILLOW_GRID(g).masksAndNode4.zw);
   const uint child = treeChild(g, node4, cell);
   if (child == kNone) return node.items[node4 * kTreeNode4Words + 1u];
-  return WordArray(params.grids[g].children.xy).items[node.items[node4 * kTreeNode4Words] + child];
+  return WordArray(BILLOW_GRID(g).children.xy).items[node.items[node4 * kTreeNode4Words] + child];
 }
 
 uint findInDense(uint g, uvec3 cell) {
-  const uint node4 = WordArray(params.grids[g].tableAndRecords.xy).items[node5Bit(cell)];
-  if (node4 == 0u) return uint(params.grids[g].cellDim.w);
-  return WordArray(params.grids[g].masksAndNode4.zw).items[(node4 - 1u) * 4096u + node4Bit(cell)];
+  const uint node4 = WordArray(BILLOW_GRID(g).tableAndRecords.xy).items[node5Bit(cell)];
+  if (node4 == 0u) return uint(BILLOW_GRID(g).cellDim.w);
+  return WordArray(BILLOW_GRID(g).masksAndNode4.zw).items[(node4 - 1u) * 4096u + node4Bit(cell)];
 }
 
-uint indexKind(uint g) { return kIndexKind == kIndexMixed ? uint(params.grids[g].cellMin.w) : kIndexKind; }
+uint indexKind(uint g) { return kIndexKind == kIndexMixed ? uint(BILLOW_GRID(g).cellMin.w) : kIndexKind; }
 
 // The record of the cell (pack index >> 3); 0, the background, outside of the active box.
 uint findRecord(uint g, ivec3 cell) {
-  const ivec3 local = cell - params.grids[g].cellMin.xyz;
-  if (any(greaterThanEqual(uvec3(local), uvec3(params.grids[g].cellDim.xyz)))) return 0u;
+  const ivec3 local = cell - BILLOW_GRID(g).cellMin.xyz;
+  if (any(greaterThanEqual(uvec3(local), uvec3(BILLOW_GRID(g).cellDim.xyz)))) return 0u;
   const uint kind = indexKind(g);
   if (kind == kIndexTree) return findInTree(g, uvec3(cell));
   if (kind == kIndexDense) return findInDense(g, uvec3(cell));
@@ -60,7 +60,7 @@ uint findRecord(uint g, ivec3 cell) {
 
 float getVoxel(uint g, ivec3 voxel) {
   const uint number = findRecord(g, voxel >> 3);
-  if (number == 0u) return params.grids[g].boxMin.w;
+  if (number == 0u) return BILLOW_GRID(g).boxMin.w;
   return recordVoxel(g, loadRecord(g, number), uvec3(voxel & 7));
 }
 
@@ -83,13 +83,35 @@ float sampleTrilinear(uint g, vec3 p) {
                               mix(mix(f, 1.0 - f, crosses), vec3(0.0), next));
     const uint number = findRecord(g, (voxel >> 3) + ivec3(next));
     if (number == 0u) {
-      sum += params.grids[g].boxMin.w * totalWeight(w);
+      sum += BILLOW_GRID(g).boxMin.w * totalWeight(w);
     } else {
       sum += recordCorners(g, loadRecord(g, number), v, w);
     }
     beyond = beyond - axes & axes;
   } while (beyond != 0u);
   return sum;
+}
+
+// How much of such an interpolation is of active voxels.
+float activeShare(uint g, vec3 p) {
+  const vec3 base = floor(p);
+  const vec3 f = p - base;
+  const ivec3 voxel = ivec3(base);
+  const uvec3 inner = uvec3(voxel & 7);
+  const bvec3 crosses = equal(inner, uvec3(7u));
+  const uint axes = uint(crosses.x) | uint(crosses.y) << 1 | uint(crosses.z) << 2;
+  float share = 0.0;
+  uint beyond = 0u;
+  do {
+    const bvec3 next = notEqual(beyond & uvec3(1, 2, 4), uvec3(0u));
+    const uvec3 v = mix(min(inner, 6u), uvec3(0u), next);
+    const Weights w = Weights(mix(mix(1.0 - f, vec3(0.0), crosses), f, next),
+                              mix(mix(f, 1.0 - f, crosses), vec3(0.0), next));
+    const uint number = findRecord(g, (voxel >> 3) + ivec3(next));
+    if (number != 0u) share += activeWeight(g, loadRecord(g, number), v, w);
+    beyond = beyond - axes & axes;
+  } while (beyond != 0u);
+  return share;
 }
 
 float sampleGrid(uint g, vec3 p, uint how) {

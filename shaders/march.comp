@@ -1,5 +1,5 @@
 // The direct method: one thread a pixel marches the node tree itself.
-// BILLOW_COLOR_FORMAT is rgba16f or rgba32f.
+// BILLOW_COLOR_FORMAT is rgba16f or rgba32f; with BILLOW_LAYERS it draws the sum of several layers.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_buffer_reference : require
@@ -25,16 +25,10 @@ struct Sum {
 
 // One step of length dt centred on distance t. The source is constant over the step, its own extinction included:
 // (1 - exp(-s dt)) / s (Hillaire 2015, "Physically based and unified volumetric rendering in Frostbite").
-void shade(Ray rays[3], vec3 direction, float t, float dt, inout Sum sum) {
-  float value[3];
-  for (uint g = 0u; g < kMatterSlots; ++g) {
-    value[g] = hasGrid(g) ? sampleGrid(g, rays[g].origin + rays[g].direction * t, kFilter) : 0.0;
-  }
-  const float extinction = extinctionOf(value[extinctionSlot()]);
-  vec3 source = vec3(0.0);
-  if (hasGrid(kTemperatureSlot) || hasGrid(kFlamesSlot)) {
-    source = emissionOf(value[kTemperatureSlot], value[kFlamesSlot]);
-  }
+void shade(Rays rays, vec3 direction, float t, float dt, inout Sum sum) {
+  const Matter matter = matterAt(rays, t);
+  const float extinction = matter.extinction;
+  vec3 source = matter.emission;
   const float opticalDepth = extinction * dt;
   const float after = exp(-opticalDepth);
   // Light is what costs; where a sample can hardly be seen its predecessor's will do.
@@ -53,34 +47,11 @@ void shade(Ray rays[3], vec3 direction, float t, float dt, inout Sum sum) {
 float interleavedNoise(vec2 pixel) { return fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715)))); }
 
 // Length of a step that starts at distance t: so many voxels, but never less than a pixel.
-float stepLength(Ray rays[3], float t) {
-  float voxel = kFar;
-  for (uint g = 0u; g < kMatterSlots; ++g) {
-    if (hasGrid(g)) voxel = min(voxel, 1.0 / length(rays[g].direction));
-  }
-  return max(params.forward.w * voxel, t * params.right.w);
-}
-
-float nextOccupied(Ray rays[3], float t) {
-  float next = kFar;
-  for (uint g = 0u; g < kMatterSlots; ++g) {
-    if (hasGrid(g)) next = min(next, skipEmpty(g, rays[g], t));
-  }
-  return next;
-}
-
-float endOfGrids(Ray rays[3]) {
-  float end = 0.0;
-  for (uint g = 0u; g < kMatterSlots; ++g) {
-    const vec2 range = crossGrid(g, rays[g]);
-    if (hasGrid(g) && range.x < range.y) end = max(end, range.y);
-  }
-  return end;
-}
+float stepLength(float voxel, float t) { return max(params.forward.w * voxel, t * params.right.w); }
 
 Sum march(vec3 direction, vec2 pixel) {
-  Ray rays[3];
-  for (uint g = 0u; g < kMatterSlots; ++g) rays[g] = makeRay(g, vec3(0.0), direction);
+  const Rays rays = raysAlong(direction);
+  const float voxel = finestVoxel(rays);
   Sum sum = Sum(vec3(0.0), 1.0, 0.0, vec3(-1.0));
   const float end = endOfGrids(rays);
   // Not below 1/8: a step far below the others would only cost time.
@@ -92,7 +63,7 @@ Sum march(vec3 direction, vec2 pixel) {
       t = next;
       continue;
     }
-    float dt = min(stepLength(rays, t), end - t);
+    float dt = min(stepLength(voxel, t), end - t);
     if (shift > 0.0) dt *= shift;  // the first step alone is cut, so that all later ones are displaced
     shift = 0.0;
     shade(rays, direction, t + 0.5 * dt, dt, sum);

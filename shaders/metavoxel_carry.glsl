@@ -9,22 +9,16 @@ vec3 indexAlong(uint g, vec3 way) {
   return vec3(dot(params.grids[g].toIndex[0].xyz, way), dot(params.grids[g].toIndex[1].xyz, way),
               dot(params.grids[g].toIndex[2].xyz, way));
 }
-vec3 indexOf(uint g, vec3 world) {
-  return indexAlong(g, world) +
-         vec3(params.grids[g].toIndex[0].w, params.grids[g].toIndex[1].w, params.grids[g].toIndex[2].w);
-}
 float readGrid(uint g, vec3 world) { return sampleGrid(g, indexOf(g, world), kFilterTrilinear); }
 
 // By how many voxels matter is carried at the velocity of a place.
 vec3 wayAt(vec3 voxel) {
-  const vec3 world = worldOf(voxel);
-  vec3 velocity = vec3(0.0);
-  for (uint i = 0u; i < 3u; ++i) {
-    if (hasGrid(kVelocityXSlot + i)) velocity[i] = readGrid(kVelocityXSlot + i, world);
-  }
+  const vec3 far = farthest();
+  const vec3 velocity = velocityAt(worldOf(voxel), mat3(meta.toWorld[0].xyz * far.x, meta.toWorld[1].xyz * far.y,
+                                                        meta.toWorld[2].xyz * far.z));
   const vec3 way = vec3(dot(params.flow[0].xyz, velocity), dot(params.flow[1].xyz, velocity),
                         dot(params.flow[2].xyz, velocity));
-  return clamp(way, -farthest(), farthest());
+  return clamp(way, -far, far);
 }
 
 const float kCarriedUnits = 16.0;  // a voxel, of the box

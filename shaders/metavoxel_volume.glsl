@@ -2,13 +2,12 @@
 #ifndef BILLOW_METAVOXEL_VOLUME
 #define BILLOW_METAVOXEL_VOLUME
 
-#include "lookup.glsl"
 #include "metavoxel.glsl"
+#include "velocity.glsl"
 
 shared uint found;
 
-// Whether matter is carried along velocities, and by how many voxels of the space at most.
-bool carries() { return kGrids >> kVelocityXSlot != 0u; }
+// By how many voxels of the space matter is carried at most.
 vec3 farthest() { return carries() ? vec3(params.flow[0].w, params.flow[1].w, params.flow[2].w) : vec3(0.0); }
 
 // Pack index box of what a filtered read between `a` and `b` may touch. Its corners bound it, for the map is affine.
@@ -17,9 +16,7 @@ void indexBox(uint g, vec3 a, vec3 b, out vec3 low, out vec3 high) {
   high = vec3(-3e38);
   for (uint corner = 0u; corner < 8u; ++corner) {
     const vec3 world = worldOf(mix(a, b, notEqual(corner & uvec3(1, 2, 4), uvec3(0u))));
-    const vec3 p = vec3(dot(params.grids[g].toIndex[0].xyz, world), dot(params.grids[g].toIndex[1].xyz, world),
-                        dot(params.grids[g].toIndex[2].xyz, world)) +
-                   vec3(params.grids[g].toIndex[0].w, params.grids[g].toIndex[1].w, params.grids[g].toIndex[2].w);
+    const vec3 p = indexOf(g, world);
     low = min(low, p);
     high = max(high, p);
   }

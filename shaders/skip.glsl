@@ -13,9 +13,9 @@ struct Ray {  // in one grid's pack index space; t is the distance in world unit
 };
 
 Ray makeRay(uint g, vec3 from, vec3 along) {
-  const vec4 x = params.grids[g].toIndex[0];
-  const vec4 y = params.grids[g].toIndex[1];
-  const vec4 z = params.grids[g].toIndex[2];
+  const vec4 x = BILLOW_GRID(g).toIndex[0];
+  const vec4 y = BILLOW_GRID(g).toIndex[1];
+  const vec4 z = BILLOW_GRID(g).toIndex[2];
   Ray ray;
   ray.origin = vec3(dot(x.xyz, from), dot(y.xyz, from), dot(z.xyz, from)) + vec3(x.w, y.w, z.w);
   ray.direction = vec3(dot(x.xyz, along), dot(y.xyz, along), dot(z.xyz, along));
@@ -33,24 +33,38 @@ vec2 crossBox(Ray ray, vec3 low, vec3 high) {
   return vec2(max(max(near.x, near.y), near.z), min(min(far.x, far.y), far.z));
 }
 
-vec2 crossGrid(uint g, Ray ray) { return crossBox(ray, params.grids[g].boxMin.xyz, params.grids[g].boxMax.xyz); }
+// By how far, in pack indices, what the grid holds may be carried.
+vec3 carriedFarthest(uint g) {
+#ifdef BILLOW_LAYERS
+  const vec3 most = vec3(layers[layerNow].flow[0].w, layers[layerNow].flow[1].w, layers[layerNow].flow[2].w);
+  return vec3(dot(abs(BILLOW_GRID(g).toIndex[0].xyz), most), dot(abs(BILLOW_GRID(g).toIndex[1].xyz), most),
+              dot(abs(BILLOW_GRID(g).toIndex[2].xyz), most));
+#else
+  return vec3(0.0);
+#endif
+}
+
+vec2 crossGrid(uint g, Ray ray) {
+  const vec3 farthest = carriedFarthest(g);
+  return crossBox(ray, BILLOW_GRID(g).boxMin.xyz - farthest, BILLOW_GRID(g).boxMax.xyz + farthest);
+}
 
 // Log2 of the voxels that the skippable node around `cell` spans: 7 for an absent Node4, 3 for an absent Node3;
 // 0 where something is.
 uint absentSpanLog2(uint g, uvec3 cell, bool dense) {
   uint node4;
   if (dense) {
-    node4 = WordArray(params.grids[g].tableAndRecords.xy).items[node5Bit(cell)] - 1u;
+    node4 = WordArray(BILLOW_GRID(g).tableAndRecords.xy).items[node5Bit(cell)] - 1u;
   } else {
     node4 = treeNode4(g, cell);
   }
-  if (node4 == kNone) return params.grids[g].cellDim.w == 0 ? kNode4SpanLog2 : 0u;
+  if (node4 == kNone) return BILLOW_GRID(g).cellDim.w == 0 ? kNode4SpanLog2 : 0u;
   if (dense) {
-    const uint record = WordArray(params.grids[g].masksAndNode4.zw).items[node4 * 4096u + node4Bit(cell)];
+    const uint record = WordArray(BILLOW_GRID(g).masksAndNode4.zw).items[node4 * 4096u + node4Bit(cell)];
     return record == 0u ? kNode3SpanLog2 : 0u;
   }
   if (treeChild(g, node4, cell) != kNone) return 0u;
-  const uint absent = WordArray(params.grids[g].masksAndNode4.zw).items[node4 * kTreeNode4Words + 1u];
+  const uint absent = WordArray(BILLOW_GRID(g).masksAndNode4.zw).items[node4 * kTreeNode4Words + 1u];
   return absent == 0u ? kNode3SpanLog2 : 0u;
 }
 
@@ -59,8 +73,8 @@ bool emptyBox(uint g, vec3 p, out vec3 low, out vec3 high) {
   // A nearest lookup at p reads voxel floor(p + 1/2); a trilinear one floor(p) and its upper neighbours.
   const float shift = kFilter == kFilterTrilinear ? 0.0 : 0.5;
   const ivec3 cell = ivec3(floor(p + shift)) >> 3;
-  const ivec3 local = cell - params.grids[g].cellMin.xyz;
-  if (any(greaterThanEqual(uvec3(local), uvec3(params.grids[g].cellDim.xyz)))) return false;
+  const ivec3 local = cell - BILLOW_GRID(g).cellMin.xyz;
+  if (any(greaterThanEqual(uvec3(local), uvec3(BILLOW_GRID(g).cellDim.xyz)))) return false;
   const uint kind = indexKind(g);
   if (kind == kIndexFlat) {
     const uint entry = flatEntry(g, local);
@@ -84,9 +98,15 @@ float skipEmpty(uint g, Ray ray, float t) {
   const vec2 range = crossGrid(g, ray);
   if (range.x >= range.y || t >= range.y) return kFar;
   if (t < range.x) return range.x;
-  if (params.grids[g].boxMax.w == 0.0) return t;
+  if (BILLOW_GRID(g).boxMax.w == 0.0) return t;
   vec3 low, high;
-  if (!emptyBox(g, ray.origin + ray.direction * t, low, high)) return t;
+  const vec3 p = ray.origin + ray.direction * t;
+  if (!emptyBox(g, p, low, high)) return t;
+#ifdef BILLOW_LAYERS
+  low += carriedFarthest(g);
+  high -= carriedFarthest(g);
+  if (any(lessThanEqual(p, low)) || any(greaterThanEqual(p, high))) return t;
+#endif
   const float exit = crossBox(ray, low, high).y;
   return exit >= range.y ? kFar : max(exit, t);
 }

@@ -17,12 +17,17 @@ inline constexpr double kMiddle = (kFirstCell * 8 + (kCloudDim - 1) / 2.0) * 0.1
 
 struct MovingCloud {
   bool burning = false;                    // with its core as grid "flames"
-  std::array<float, 3> velocity{0, 0, 0};  // everywhere
+  std::array<float, 3> velocity{0, 0, 0};  // everywhere, or
+  bool tight = false;                      // only where the cloud is
   bool whirl = false;                      // in its place, a radian a second around z through the cloud's middle
   std::uint32_t shift = 0;                 // voxels along x, 0 to 8
 };
 
 namespace layers {
+
+inline float densityOf(const MovingCloud& cloud, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+  return x < cloud.shift || x - cloud.shift >= kCloudDim ? 0.0f : cloudDensity(kCloudDim, x - cloud.shift, y, z);
+}
 
 // `valueAt` gives a grid's value in [0, 1] by voxel of the cloud's box and, along x, one brick more.
 template <class Value>
@@ -46,6 +51,21 @@ format::GridFrame cloudGrid(format::PackWriter& writer, format::PackTables& tabl
 
 inline format::GridFrame velocityGrid(format::PackWriter& writer, format::PackTables& tables, const MovingCloud& cloud,
                                       std::uint32_t axis) {
+  if (cloud.tight) {
+    GridFrameBuilder grid(writer, 0);
+    for (std::uint32_t cell = 0; cell < 7 * 36; ++cell) {
+      const std::uint32_t at[3] = {cell / 36, cell / 6 % 6, cell % 6};
+      format::Mask3 mask{};
+      for (std::uint32_t i = 0; i < 512; ++i) {
+        const float value = densityOf(cloud, at[0] * 8 + (i >> 6), at[1] * 8 + (i >> 3 & 7), at[2] * 8 + (i & 7));
+        if (value * 255 >= 1) mask.words[i >> 5] |= 1u << (i & 31);
+      }
+      if (std::all_of(std::begin(mask.words), std::end(mask.words), [](std::uint32_t w) { return w == 0; })) continue;
+      grid.brick({kFirstCell + at[0], kFirstCell + at[1], kFirstCell + at[2]}, format::kEncodingConstant, {},
+                 cloud.velocity[axis], 0, 0, mask);
+    }
+    return grid.finish(tables);
+  }
   if (!cloud.whirl) {
     GridFrameBuilder grid(writer, cloud.velocity[axis]);
     grid.brick({kFirstCell, kFirstCell, kFirstCell}, format::kEncodingConstant, {}, cloud.velocity[axis], 0,
@@ -80,7 +100,7 @@ inline std::vector<std::byte> movingCloudPack(const MovingCloud& cloud) {
   return writePack({}, [&](format::PackWriter& writer) {
     format::PackTables tables = sampleTables("v", names, 1);
     const auto density = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-      return x < cloud.shift || x - cloud.shift >= kCloudDim ? 0.0f : cloudDensity(kCloudDim, x - cloud.shift, y, z);
+      return layers::densityOf(cloud, x, y, z);
     };
     const auto core = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
       return std::max(density(x, y, z) - 0.5f, 0.0f);

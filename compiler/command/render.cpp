@@ -141,7 +141,8 @@ class Painter {
         return refuse(kInvalid, fmt::format("{}: no frame shows {} s after the begin; \"direct\" draws one",
                                             job.request.volumes[0].place, moment.time));
       }
-      draw.frame = shown.layers[0][0].frame;
+      draw.layers = shown.layers[0];
+      draw.velocityScale = job.request.velocityScale;
       draw.look = shown.volumes[0].look;
     }
     auto picture = metavoxels_ ? metavoxels_->render(*gpu_, *renderer_, draw, shown) : gpu_->render(*renderer_, draw);

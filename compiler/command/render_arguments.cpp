@@ -205,7 +205,7 @@ void addMethodOptions(CLI::App& command, RenderArguments& arguments) {
   command
       .add_option("--interpolate", arguments.interpolate,
                   "What volumes show between frames: hold (default) the frame before, blend it with the next, or\n"
-                  "advect: carry both along their velocity to the moment, and blend these; needs --method metavoxel")
+                  "advect: carry both along their velocity to the moment, and blend these")
       ->check(CLI::IsMember({"hold", "blend", "advect"}));
   command
       .add_option("--velocity-scale", arguments.direct.velocityScale,
@@ -275,7 +275,7 @@ Checked<void> applyMethod(const RenderArguments& arguments, RenderRequest& reque
   using enum runtime::Interpolation;
   const std::string interpolate = arguments.interpolate.value_or("hold");
   request.interpolate = interpolate == "advect" ? advect : interpolate == "blend" ? blend : hold;
-  const bool needed = request.scene || !request.effects.empty() || request.interpolate != hold;
+  const bool needed = request.scene || !request.effects.empty();
   request.method = arguments.method ? (*arguments.method == "direct" ? Method::direct : Method::metavoxel)
                    : needed         ? Method::metavoxel
                                     : Method::direct;
@@ -284,10 +284,6 @@ Checked<void> applyMethod(const RenderArguments& arguments, RenderRequest& reque
   // More of them imitate what is now found.
   if (request.surroundings > 0 && !request.look.scatteringOrders) request.look.scatteringOrders = 1;
   if (request.method == Method::metavoxel) return {};
-  if (request.interpolate != hold) {
-    return refuse(kCommandLine,
-                  fmt::format("--interpolate {} is drawn by --method metavoxel alone, not by \"direct\"", interpolate));
-  }
   if (request.surroundings > 0) {
     return refuse(kCommandLine, "--surroundings is drawn by --method metavoxel alone, not by \"direct\"");
   }

@@ -77,7 +77,8 @@ class HeadlessImpl final : public Headless {
   void waitIdle() override { device_.vk.vkDeviceWaitIdle(device_.host.device); }
 
   Result<Picture> render(runtime::Renderer& renderer, runtime::DrawInfo draw) override {
-    return drawPicture(renderer, draw, draw.frame->uploadValue(), [&] { return renderer.record(commands_, draw); });
+    return drawPicture(renderer, draw, uploadValueOf(draw.frame, draw.layers),
+                       [&] { return renderer.record(commands_, draw); });
   }
 
   Result<Picture> render(runtime::Renderer& renderer, runtime::Metavoxels& metavoxels, runtime::MetavoxelDraw draw,
@@ -180,7 +181,7 @@ class HeadlessImpl final : public Headless {
       return {};
     };
     const auto take = [&] { milliseconds.push_back(passTimes(2)[0]); };
-    if (auto done = drawTimed(renderer, draw, draw.frame->uploadValue(), count, record, take); !done) {
+    if (auto done = drawTimed(renderer, draw, uploadValueOf(draw.frame, draw.layers), count, record, take); !done) {
       return tl::unexpected(done.error());
     }
     return milliseconds;

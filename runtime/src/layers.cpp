@@ -4,15 +4,12 @@
 #include <cmath>
 
 namespace billow::runtime {
-namespace {
 
 bool carried(const Layer& layer) {
   const auto& grids = frameOf(layer).grids_;
   return layer.advect != 0 && std::any_of(grids.begin() + gpu::kVelocityXSlot, grids.end(),
                                           [](const ResidentGrid& grid) { return grid.present; });
 }
-
-}  // namespace
 
 const char* badLayers(const Frame* frame, std::span<const Layer> layers) {
   if ((frame == nullptr) == layers.empty()) return "frame";

@@ -19,6 +19,9 @@ inline const ResidentFrame& frameOf(const Layer& layer) {
   return static_cast<const ResidentFrame&>(*layer.frame);
 }
 
+// Whether it is carried along a velocity.
+bool carried(const Layer& layer);
+
 // The grids that drawing the layer reads: those of velocity only where it is carried along them.
 FrameIndices indicesOf(const Layer& layer);
 

@@ -2,7 +2,7 @@
 #ifndef BILLOW_RUNTIME_PARAMS_H
 #define BILLOW_RUNTIME_PARAMS_H
 
-#include "frame.h"
+#include "layers.h"
 
 namespace billow::runtime {
 
@@ -13,6 +13,13 @@ gpu::MarchParams viewParams(const DrawInfo& draw);
 // Two addresses, each as low and high word.
 gpu::uvec4 addresses(VkDeviceAddress a, VkDeviceAddress b);
 gpu::MarchParams marchParams(const ResidentFrame& frame, const DrawInfo& draw);
+
+// What shaders/bindings.glsl has where several layers are drawn at once.
+struct LayeredParams {
+  gpu::MarchParams view{};
+  std::array<gpu::LayerParams, gpu::kLayerCount> layers{};
+};
+LayeredParams layeredParams(std::span<const Layer> layers, const DrawInfo& draw);
 gpu::MarchParams lookupParams(const ResidentFrame& frame, Filter filter);
 
 }  // namespace billow::runtime

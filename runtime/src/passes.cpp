@@ -5,25 +5,38 @@
 #include <span>
 
 #include "compute_pipeline.h"
+#include "params.h"
 #include "spirv.h"
 
 namespace billow::runtime {
 namespace {
 
 // At least as large as any device's uniform buffer alignment.
-constexpr std::uint64_t kParamsStride = (sizeof(gpu::MarchParams) + 255) / 256 * 256;
+constexpr std::uint64_t kParamsStride = (sizeof(LayeredParams) + 255) / 256 * 256;
 constexpr std::uint32_t kPushBytes = 24;  // voxels.comp
-constexpr std::uint32_t kAtlasBinding = 1;
-constexpr std::uint32_t kBindings = 4;
+constexpr std::uint32_t kColorBinding = 2, kDepthBinding = 3;
+constexpr std::uint32_t kBindings = 7;  // and atlases: of the first layer 1, of others 4 to 6
 
 VkDescriptorType bindingType(std::uint32_t binding) {
   if (binding == 0) return VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
-  return binding == kAtlasBinding ? VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE : VK_DESCRIPTOR_TYPE_STORAGE_IMAGE;
+  const bool picture = binding == kColorBinding || binding == kDepthBinding;
+  return picture ? VK_DESCRIPTOR_TYPE_STORAGE_IMAGE : VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE;
 }
 
+// In the order of Shader.
 std::span<const std::uint32_t> spirvOf(Shader shader) {
-  if (shader == Shader::marchHalf) return spirv::kMarchHalf;
-  return shader == Shader::marchSingle ? std::span<const std::uint32_t>(spirv::kMarchSingle) : spirv::kVoxels;
+  static const std::span<const std::uint32_t> codes[] = {
+      spirv::kMarchHalf, spirv::kMarchSingle, spirv::kMarchLayersHalf, spirv::kMarchLayersSingle, spirv::kVoxels};
+  return codes[static_cast<std::size_t>(shader)];
+}
+
+void addGrids(const FrameIndices& indices, PassKey& key) {
+  for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
+    if (!indices[slot]) continue;
+    const std::uint32_t index = static_cast<std::uint32_t>(*indices[slot]);
+    key.index = key.grids == 0 || key.index == index ? index : gpu::kIndexMixed;
+    key.grids |= 1u << slot;
+  }
 }
 
 }  // namespace
@@ -34,12 +47,14 @@ PassKey passKey(const FrameIndices& indices, Shader shader, Filter filter, Filte
               .filter = static_cast<std::uint32_t>(filter),
               .shadow = static_cast<std::uint32_t>(shadow),
               .grids = 0};
-  for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
-    if (!indices[slot]) continue;
-    const std::uint32_t index = static_cast<std::uint32_t>(*indices[slot]);
-    key.index = key.grids == 0 || key.index == index ? index : gpu::kIndexMixed;
-    key.grids |= 1u << slot;
-  }
+  addGrids(indices, key);
+  return key;
+}
+
+PassKey passKey(std::span<const Layer> layers, Shader shader, Filter filter, Filter shadow) {
+  PassKey key = passKey(FrameIndices{}, shader, filter, shadow);
+  for (const Layer& layer : layers) addGrids(indicesOf(layer), key);
+  key.layers = static_cast<std::uint32_t>(layers.size());
   return key;
 }
 
@@ -88,7 +103,7 @@ Result<void> Passes::createLayouts() {
 
 Result<void> Passes::createSets() {
   const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, inFlight_},
-                                        {VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE, inFlight_},
+                                        {VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE, (kBindings - 3) * inFlight_},
                                         {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, 2 * inFlight_}};
   auto poolInfo = begin<VkDescriptorPoolCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO);
   poolInfo.maxSets = inFlight_;
@@ -112,27 +127,29 @@ Result<VkPipeline> Passes::pipeline(const PassKey& key) {
   // The place first, so that no pipeline is lost where there is no memory for it.
   VkPipeline& place = pipelines_[key];
   if (place != VK_NULL_HANDLE) return place;
-  const std::uint32_t constants[] = {key.index, key.filter, key.shadow, key.grids};
+  const std::uint32_t constants[] = {key.index, key.filter, key.shadow, key.grids, key.layers};
   auto made = makeComputePipeline(device_, pipelineLayout_, spirvOf(key.shader), constants);
   if (made) place = *made;
   return made;
 }
 
-void Passes::bind(VkCommandBuffer commands, const ResidentFrame& frame, const gpu::MarchParams& params,
+void Passes::bind(VkCommandBuffer commands, std::span<const VkImageView> atlases, std::span<const std::byte> params,
                   VkImageView color, VkImageView depth) {
   const std::uint64_t offset = next_ * kParamsStride;
   const VkDescriptorSet set = sets_[next_];
   next_ = (next_ + 1) % inFlight_;
-  std::memcpy(params_.mapped().subspan(offset, sizeof(params)).data(), &params, sizeof(params));
-  const VkDescriptorBufferInfo bufferInfo{params_.handle(), offset, sizeof(params)};
-  const VkImageView views[kBindings] = {VK_NULL_HANDLE, frame.atlas_, color, depth};
+  std::memcpy(params_.mapped().subspan(offset, params.size()).data(), params.data(), params.size());
+  const VkDescriptorBufferInfo bufferInfo{params_.handle(), offset, params.size()};
+  // Bindings of layers that are not there hold the first one's.
+  const auto atlas = [&](std::size_t layer) { return atlases[layer < atlases.size() ? layer : 0]; };
+  const VkImageView views[kBindings] = {VK_NULL_HANDLE, atlas(0), color, depth, atlas(1), atlas(2), atlas(3)};
   std::array<VkDescriptorImageInfo, kBindings> images{};
   std::array<VkWriteDescriptorSet, kBindings> writes{};
   std::uint32_t count = 0;
   for (std::uint32_t i = 0; i < kBindings; ++i) {
     if (i != 0 && views[i] == VK_NULL_HANDLE) continue;
     const VkImageLayout layout =
-        i == kAtlasBinding ? VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL : VK_IMAGE_LAYOUT_GENERAL;
+        i == kColorBinding || i == kDepthBinding ? VK_IMAGE_LAYOUT_GENERAL : VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL;
     images[i] = {VK_NULL_HANDLE, views[i], layout};
     VkWriteDescriptorSet& write = writes[count++];
     write = begin<VkWriteDescriptorSet>(VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET);

@@ -3,14 +3,15 @@
 #define BILLOW_RUNTIME_PASSES_H
 
 #include <map>
+#include <span>
 #include <tuple>
 #include <vector>
 
-#include "frame.h"
+#include "layers.h"
 
 namespace billow::runtime {
 
-enum class Shader : std::uint32_t { marchHalf, marchSingle, voxels };
+enum class Shader : std::uint32_t { marchHalf, marchSingle, marchLayersHalf, marchLayersSingle, voxels };
 
 // What a pipeline is specialised for.
 struct PassKey {
@@ -19,13 +20,16 @@ struct PassKey {
   std::uint32_t filter = gpu::kFilterTrilinear;
   std::uint32_t shadow = gpu::kFilterTrilinear;
   std::uint32_t grids = 0;
+  std::uint32_t layers = 1;
   bool operator<(const PassKey& other) const {
-    return std::tie(shader, index, filter, shadow, grids) <
-           std::tie(other.shader, other.index, other.filter, other.shadow, other.grids);
+    return std::tie(shader, index, filter, shadow, grids, layers) <
+           std::tie(other.shader, other.index, other.filter, other.shadow, other.grids, other.layers);
   }
 };
 
 PassKey passKey(const FrameIndices& indices, Shader shader, Filter filter, Filter shadow);
+// Of all layers together; one that lacks a grid reads zeros there.
+PassKey passKey(std::span<const Layer> layers, Shader shader, Filter filter, Filter shadow);
 
 class Passes {
  public:
@@ -38,9 +42,9 @@ class Passes {
   Result<VkPipeline> pipeline(const PassKey& key);
 
   // Takes the next descriptor set and parameter slot of the ring, fills and binds them. `color` and `depth` may be null
-  // where the shader has no images.
-  void bind(VkCommandBuffer commands, const ResidentFrame& frame, const gpu::MarchParams& params, VkImageView color,
-            VkImageView depth);
+  // where the shader has no images. `params`: MarchParams or LayeredParams; `atlases`: one a layer, at least one.
+  void bind(VkCommandBuffer commands, std::span<const VkImageView> atlases, std::span<const std::byte> params,
+            VkImageView color, VkImageView depth);
   VkPipelineLayout layout() const { return pipelineLayout_; }
 
  private:

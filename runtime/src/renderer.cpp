@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -56,7 +57,8 @@ std::string missingFeatures(const EnabledFeatures& features) {
 }
 
 const char* badField(const DrawInfo& draw) {
-  if (draw.frame == nullptr) return "frame";
+  if (const char* field = badLayers(draw.frame, draw.layers)) return field;
+  if (!std::isfinite(draw.velocityScale)) return "velocityScale";
   if (draw.width == 0 || draw.height == 0) return "width, height";
   if (draw.color == VK_NULL_HANDLE || draw.depth == VK_NULL_HANDLE) return "color, depth";
   for (const char* field : {badView(draw.view), badSun(draw.sun), badBackground(draw.background), badLook(draw.look),
@@ -132,16 +134,50 @@ class RendererImpl final : public Renderer {
 
   Result<void> recordMarch(VkCommandBuffer commands, const DrawInfo& draw) {
     if (const char* field = badField(draw)) return failure(ErrorCode::argument, badMessage(field));
-    const auto& frame = static_cast<const ResidentFrame&>(*draw.frame);
-    const PassKey key =
-        passKey(matterOf(frame.indices()), marchOf(draw.colorFormat), draw.quality.filter, draw.quality.shadows);
+    const std::vector<Layer> layers = layersOf(draw.frame, draw.layers);
+    const PassKey key = keyOf(layers, draw);
     const auto pipeline = passes_.pipeline(key);
     if (!pipeline) return tl::unexpected(pipeline.error());
     const DebugLabel label(device_.api, commands, "billow march");
-    passes_.bind(commands, frame, marchParams(frame, draw), draw.color, draw.depth);
+    bindMarch(commands, layers, draw);
     device_.api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, *pipeline);
     device_.api.vkCmdDispatch(commands, (draw.width + 7) / 8, (draw.height + 7) / 8, 1);
     return {};
+  }
+
+  // Nothing, or one layer that stays where it is: these have a shader of their own.
+  static bool plain(std::span<const Layer> layers) {
+    return layers.empty() || (layers.size() == 1 && !carried(layers[0]));
+  }
+
+  static PassKey keyOf(std::span<const Layer> layers, const DrawInfo& draw) {
+    const Quality& quality = draw.quality;
+    const bool half = draw.colorFormat == ColorFormat::half;
+    const Shader shader = plain(layers) ? marchOf(draw.colorFormat)
+                          : half        ? Shader::marchLayersHalf
+                                        : Shader::marchLayersSingle;
+    PassKey key = passKey(layers, shader, quality.filter, quality.shadows);
+    if (plain(layers)) key.layers = 1;
+    return key;
+  }
+
+  void bindMarch(VkCommandBuffer commands, std::span<const Layer> layers, const DrawInfo& draw) {
+    std::vector<VkImageView> atlases;
+    for (const Layer& layer : layers) atlases.push_back(frameOf(layer).atlas_);
+    if (!plain(layers)) {
+      const LayeredParams params = layeredParams(layers, draw);
+      passes_.bind(commands, atlases, std::as_bytes(std::span(&params, 1)), draw.color, draw.depth);
+      return;
+    }
+    // Of nothing, any frame's atlas is bound, and not read.
+    const Layer any{.frame = draw.frame != nullptr ? draw.frame : draw.layers[0].frame};
+    const Layer& layer = layers.empty() ? any : layers[0];
+    if (layers.empty()) atlases.push_back(frameOf(any).atlas_);
+    DrawInfo weighted = draw;
+    weighted.look.extinctionScale *= layer.weight;
+    weighted.look.emissionScale *= layer.weight;
+    const gpu::MarchParams params = marchParams(frameOf(layer), weighted);
+    passes_.bind(commands, atlases, std::as_bytes(std::span(&params, 1)), draw.color, draw.depth);
   }
 
   Result<void> recordVoxels(VkCommandBuffer commands, const LookupInfo& lookup) {
@@ -156,7 +192,8 @@ class RendererImpl final : public Renderer {
     if (lookup.filter == Filter::none) return failure(ErrorCode::argument, "LookupInfo: filter is none");
     const auto pipeline = passes_.pipeline(passKey(frame->indices(), Shader::voxels, lookup.filter, Filter::none));
     if (!pipeline) return tl::unexpected(pipeline.error());
-    passes_.bind(commands, *frame, lookupParams(*frame, lookup.filter), VK_NULL_HANDLE, VK_NULL_HANDLE);
+    const gpu::MarchParams params = lookupParams(*frame, lookup.filter);
+    passes_.bind(commands, {&frame->atlas_, 1}, std::as_bytes(std::span(&params, 1)), VK_NULL_HANDLE, VK_NULL_HANDLE);
     const auto low = [](VkDeviceAddress x) { return static_cast<std::uint32_t>(x & 0xffffffffu); };
     const auto high = [](VkDeviceAddress x) { return static_cast<std::uint32_t>(x >> 32); };
     const std::uint32_t push[6] = {low(lookup.positions), high(lookup.positions), low(lookup.values),

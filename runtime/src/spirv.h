@@ -11,6 +11,8 @@ using std::uint32_t;
 #include "composite_single_half.spv.h"
 #include "composite_single_single.spv.h"
 #include "march_half.spv.h"
+#include "march_layers_half.spv.h"
+#include "march_layers_single.spv.h"
 #include "march_single.spv.h"
 #include "metavoxel_bin.spv.h"
 #include "metavoxel_bin_volume.spv.h"

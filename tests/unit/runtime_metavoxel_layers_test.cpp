@@ -146,6 +146,17 @@ TEST_F(MetavoxelLayers, ConstantVelocityMovesTheWhole) {
   }
 }
 
+// Simulations have velocity only where there is gas: its front goes on into where there was none, and leaves nothing.
+TEST_F(MetavoxelLayers, FrontsGoOnWhereNoVelocityIs) {
+  const format::Pack pack = openPack(movingCloudPack({.velocity = {3, -2, 1}, .tight = true}));
+  const auto frame = uploadMoving(pack);
+  for (const float seconds : {0.1f, -0.15f}) {
+    const double t = double{seconds};
+    const headless::Picture moved = drawMoved(*frame, {3 * t, -2 * t, 1 * t});
+    EXPECT_GT(pictureDecibels(moved, draw({{frame.get(), 1, seconds}})), 50) << seconds;
+  }
+}
+
 TEST_F(MetavoxelLayers, VelocityIsOfTheVolumesOwnWorld) {
   const format::Pack pack = openPack(movingCloudPack({.velocity = {3, -2, 1}}));
   const auto frame = uploadMoving(pack);

@@ -17,6 +17,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <tl/expected.hpp>
 
@@ -202,7 +203,11 @@ struct Background {
 };
 
 struct DrawInfo {
-  const Frame* frame = nullptr;
+  const Frame* frame = nullptr;        // null where there are layers
+  std::span<const Layer> layers = {};  // in place of the frame: at most kMostLayers
+  // World units a second that a velocity grid's 1 stands for, finite. What carries matter further along an axis of the
+  // world than the layer's box is long carries it as far as that.
+  float velocityScale = 1;
   View view = {};
   Sun sun = {};
   Look look = {};
@@ -238,14 +243,14 @@ class Renderer {
   virtual VkSemaphore uploadSemaphore() const = 0;
 
   // Builds every pipeline that record() will ask for with frames of this volume, uploaded with these options and drawn
-  // with the filters of `quality` in this colour format. Reads no page; call it while loading, for it may take seconds.
+  // alone, as they are, with the filters of `quality` in this colour format. Reads no page; call it while loading, for it may take seconds.
   virtual Result<void> prepare(const format::Pack& pack, std::uint32_t volume, const UploadOptions& options,
                                const Quality& quality, ColorFormat colorFormat) = 0;
 
-  // Records one dispatch that writes every pixel of both images. Where a combination of grids, index, filters and
-  // colour format was not prepared, its pipeline is built here when it is first met.
+  // Records one dispatch that writes every pixel of both images. Where a combination of grids, index, filters, colour
+  // format, number of layers and whether they are carried was not prepared, its pipeline is built here when it is first met.
   // barriers: both images must be in VK_IMAGE_LAYOUT_GENERAL and free of pending access; afterwards they were written
-  // by the compute shader stage. The submission must wait for the frame's uploadValue().
+  // by the compute shader stage. The submission must wait for the uploadValue() of each frame.
   virtual Result<void> record(VkCommandBuffer commands, const DrawInfo& draw) = 0;
 
   // barriers: as record(), for the two buffers.
