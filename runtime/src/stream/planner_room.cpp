@@ -104,8 +104,8 @@ void Planner::leaveBlocks(const Snapshot& snapshot, std::vector<Change>& changes
 // Frames are of all sizes, and the gaps between them are not always where they are needed.
 void Planner::measureSlack() {
   const std::uint64_t stuck = transport_.wantedGpuBytes();
-  if (stuck > leavingBytes()) {
-    slack_ = std::min(slack_ + stuck / 4 + 1, budget_ / 2);
+  if (stuck > 0 && leavingBytes() == 0) {
+    slack_ = std::min(slack_ + stuck / 16 + 1, budget_ / 2);
   } else {
     slack_ -= (slack_ + 255) / 256;
   }
