@@ -17,7 +17,7 @@ step() { printf '\n== %s (%s)\n' "$1" "$(date +%T)"; }
 test_preset() { ctest --preset "$1" -j "$(nproc)" "${@:2}"; }
 
 step "Formatting"
-git ls-files '*.cpp' '*.h' | xargs clang-format --dry-run -Werror
+git ls-files '*.cpp' '*.h' '*.hpp' | xargs clang-format --dry-run -Werror
 
 step "Release build"
 cmake --preset release >/dev/null

@@ -1,0 +1,14 @@
+// Where a host's pack comes from.
+#ifndef BILLOW_RUNTIME_C_API_FILE_H
+#define BILLOW_RUNTIME_C_API_FILE_H
+
+#include "billow/runtime/stream.h"
+#include "c_api/problem.h"
+
+namespace billow::c_api {
+
+Outcome<runtime::PackSource> sourceOf(const BillowOpenInfo& info);
+
+}  // namespace billow::c_api
+
+#endif  // BILLOW_RUNTIME_C_API_FILE_H
