@@ -8,6 +8,7 @@
 
 #include "command.h"
 #include "compile_report.h"
+#include "depfile.h"
 #include "import_options.h"
 #include "progress.h"
 #include "stages.h"
@@ -28,6 +29,7 @@ struct Arguments {
   int effort = 1;
   format::Compression compression = format::Compression::small;
   unsigned threads = 0;
+  std::string depfile;
   bool json = false;
 };
 
@@ -50,6 +52,7 @@ int runCompile(const Arguments& arguments) {
   options.threads = arguments.threads;
   options.progress = drawProgress;
   const compiler::CompileReport report = compiler::compile(arguments.inputs, arguments.output, options, printWarning);
+  if (!arguments.depfile.empty()) writeDepfile(arguments.depfile, arguments.output, report.inputs);
   if (arguments.json) {
     fmt::print("{}\n",
                reportJson(report, arguments.output).dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
@@ -124,6 +127,11 @@ void addCompile(CLI::App& app, Run& run) {
   command->add_option("--threads", arguments->threads, "Threads to use [all cores]; the pack does not depend on it")
       ->check(CLI::Range(1u, 1024u))
       ->type_name("N");
+  command
+      ->add_option("--depfile", arguments->depfile,
+                   "For a build system: write what the pack depends on, as a rule of make. Folders that are searched "
+                   "are part of it, but for the pack's own")
+      ->type_name("FILE");
   command->add_flag("--json", arguments->json, "Print the report as one JSON object");
   command->footer("Example: billow compile 'fire_####.vdb' -o fire.blw");
   command->callback([arguments, &run] { run = [arguments] { return runCompile(*arguments); }; });

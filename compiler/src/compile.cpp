@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "import/input_notes.h"
 #include "passes/budget.h"
 #include "passes/write_pass.h"
 
@@ -44,7 +45,11 @@ CompileReport compile(const std::vector<std::string>& inputs, const std::string&
                       const Warn& warn) {
   std::optional<tbb::global_control> limit;
   if (options.threads != 0) limit.emplace(tbb::global_control::max_allowed_parallelism, options.threads);
-  Plan plan = planInputs(inputs, options.import, warn);
+  std::set<std::string> read;
+  Plan plan = [&] {
+    const InputNotes notes(read);
+    return planInputs(inputs, options.import, warn);
+  }();
   addLevels(plan);
   refuseToReplaceInputs(plan, output);
   if (options.budget.any() && plan.volumes.empty()) {
@@ -53,7 +58,9 @@ CompileReport compile(const std::vector<std::string>& inputs, const std::string&
   const std::unique_ptr<WritePass> pass =
       options.budget.any() ? fitBudget(output, options, plan, warn) : writeAtQuality(output, options, plan, warn);
   pass->commit();
-  return pass->report();
+  CompileReport report = pass->report();
+  report.inputs = std::move(read);
+  return report;
 }
 
 }  // namespace billow::compiler

@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -74,7 +75,8 @@ struct CompileReport {
   std::uint64_t effectGpuBytes = 0;  // format::effectGpuBytes
   std::size_t frames = 0;            // of volumes, those of their levels not counted
   std::uint64_t fileBytes = 0;
-  std::uint64_t gpuBytes = 0;  // format::packGpuBytes, and those of effects
+  std::uint64_t gpuBytes = 0;    // format::packGpuBytes, and those of effects
+  std::set<std::string> inputs;  // files that were read, folders that were searched
 };
 
 // Writes `output` whole or not at all. The bytes depend on inputs and options alone. Throws Error, std::system_error.

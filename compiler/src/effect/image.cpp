@@ -12,6 +12,7 @@
 #include <exception>
 #include <filesystem>
 
+#include "import/input_notes.h"
 #include "stages.h"
 
 namespace billow::compiler {
@@ -106,6 +107,7 @@ std::array<double, 3> Image::sample(double u, double v, bool wrap) const {
 }
 
 Image readImage(const std::string& path) {
+  noteInput(path);
   if (!std::filesystem::is_regular_file(path)) throw Error(Fault::file, path + ": no such picture");
   const std::string extension = std::filesystem::path(path).extension().string();
   if (extension != ".exr" && extension != ".png") fail(path, "expected a picture *.exr or *.png");

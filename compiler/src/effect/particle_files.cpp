@@ -7,6 +7,7 @@
 #include <numeric>
 #include <unordered_map>
 
+#include "import/input_notes.h"
 #include "import/inputs.h"
 
 namespace billow::compiler {
@@ -97,6 +98,7 @@ class Gatherer {
       append(all.lives, one.lives);
       append(all.colours, one.colours);
       given_.files.push_back(file);
+      noteInput(file);
     }
     return all;
   }

@@ -3,6 +3,7 @@
 #include <set>
 
 #include "effect/read.h"
+#include "import/input_notes.h"
 #include "json/document.h"
 #include "stages.h"
 
@@ -57,6 +58,7 @@ EffectDescription readRoot(const Value& root, const std::filesystem::path& folde
 
 EffectDescription readEffect(const std::string& path) {
   try {
+    noteInput(path);
     const json::Document document(path);
     EffectDescription effect = readRoot(document.root(), std::filesystem::path(path).parent_path());
     effect.file = path;

@@ -1,4 +1,5 @@
 #include "import/inputs.h"
+#include "import/input_notes.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -96,6 +97,7 @@ void forEachFile(const fs::path& directory, const Visit& visit) {
 
 std::vector<FoundFile> expandPattern(const std::string& input, const Pattern& pattern, const std::string& name) {
   const std::string directory = input.substr(0, input.size() - name.size());
+  noteInput(directory.empty() ? "." : directory);
   const std::string head = name.substr(0, pattern.begin), tail = name.substr(pattern.end);
   std::vector<FoundFile> found;
   forEachFile(directory.empty() ? "." : directory, [&](const fs::path& path) {
@@ -112,6 +114,7 @@ std::vector<FoundFile> expandPattern(const std::string& input, const Pattern& pa
 
 std::vector<FoundFile> expandDirectory(const std::string& input) {
   std::vector<FoundFile> found;
+  noteInput(input);
   forEachFile(input, [&](const fs::path& path) {
     const bool hidden = path.filename().string().starts_with('.');  // "._smoke_0001.vdb" is a Mac's, and no VDB
     if (isVdb(path) && !hidden) found.push_back(describe(path.string()));
@@ -120,7 +123,23 @@ std::vector<FoundFile> expandDirectory(const std::string& input) {
   return found;
 }
 
+// A match may come or go in any folder that the pattern's parts match.
+void noteFolders(const std::string& input) {
+  for (std::size_t slash = input.find_last_of('/'); slash != std::string::npos && slash > 0;
+       slash = input.find_last_of('/', slash - 1)) {
+    const std::string part = input.substr(0, slash);
+    glob_t folders{};
+    if (::glob(part.c_str(), GLOB_ONLYDIR, nullptr, &folders) == 0) {
+      for (std::size_t i = 0; i < folders.gl_pathc; ++i) noteInput(folders.gl_pathv[i]);
+    }
+    ::globfree(&folders);
+    if (part.find_first_of("*?[") == std::string::npos) return;
+  }
+  noteInput(input.front() == '/' ? "/" : ".");
+}
+
 std::vector<FoundFile> expandGlob(const std::string& input) {
+  noteFolders(input);
   glob_t matches{};
   const int result = ::glob(input.c_str(), 0, nullptr, &matches);
   std::vector<FoundFile> found;

@@ -2,6 +2,7 @@
 #include <set>
 
 #include "import/frame_choice.h"
+#include "import/input_notes.h"
 #include "import/roles.h"
 #include "import/volume_request.h"
 #include "json/document.h"
@@ -89,6 +90,7 @@ Manifest readRoot(const Value& root, const std::filesystem::path& folder, const 
 
 Manifest readManifest(const std::string& path, const ImportOptions& options) {
   try {
+    noteInput(path);
     const json::Document document(path);
     return readRoot(document.root(), std::filesystem::path(path).parent_path(), options);
   } catch (const json::FileError& error) {

@@ -9,6 +9,7 @@
 
 #include "billow/format/text.h"
 #include "effect/read.h"
+#include "import/input_notes.h"
 #include "import/inputs.h"
 #include "import/roles.h"
 #include "import/vdb_file.h"
@@ -241,6 +242,7 @@ Planned planVolume(const VolumeRequest& request, const Warn& warn) {
   volume.frames = selectFrames(files, request.options);
   GridUnion found(request.options, warn);
   for (const PlannedFrame& frame : volume.frames) {
+    std::for_each(frame.files.begin(), frame.files.end(), noteInput);
     if ((frame.flags & format::kFrameHeld) == 0) found.addFrame(frame, request.grids);
   }
   if (found.grids().empty() && found.others().empty()) failEmpty(volume, found);

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "billow/format/source.h"
+#include "import/input_notes.h"
 #include "mesh/formats.h"
 #include "stages.h"
 
@@ -28,6 +29,7 @@ void failMesh(const std::string& file, const std::string& what) {
 }
 
 std::vector<std::byte> readMeshBytes(const std::string& path, std::uint64_t limit) {
+  noteInput(path);
   const auto source = format::openFileSource(path);
   if (!source) throw Error(Fault::file, fmt::format("{}: cannot be read: {}", path, source.error().detail));
   const std::uint64_t size = (*source)->size();
