@@ -25,8 +25,8 @@ constexpr std::size_t kStageTimes = 24;  // at which effects are looked at for t
 
 std::vector<Choice> choicesOf(const format::Pack& pack) {
   std::vector<Choice> choices;
-  for (const format::VolumeRecord& volume : pack.volumes()) {
-    choices.push_back({false, std::string(pack.string(volume.name))});
+  for (std::uint32_t i = 0; i < pack.volumes().size(); ++i) {
+    if (!pack.isLevel(i)) choices.push_back({false, std::string(pack.string(pack.volumes()[i].name))});
   }
   for (const format::EffectRecord& effect : pack.effects().effects) {
     choices.push_back({true, std::string(pack.string(effect.name))});

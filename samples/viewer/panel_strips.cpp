@@ -94,7 +94,7 @@ void drawTimes(const Report& report) {
       from = to;
     }
     for (std::size_t i = 0; i < kPassNames.size(); ++i) {
-      if (report.times->passes[i] <= 0) continue;
+      if (report.times->passes[i] < 0.005) continue;
       const ImVec2 at = ImGui::GetCursorScreenPos();
       list.AddRectFilled({at.x, at.y + 3}, {at.x + 8, at.y + 11}, kPassColors[i]);
       ImGui::SetCursorScreenPos({at.x + 14, at.y});

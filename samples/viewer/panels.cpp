@@ -131,8 +131,9 @@ void Panels::drawSide(Document& document, OrbitCamera& camera, const Report& rep
   if (ImGui::CollapsingHeader("Camera and picture")) drawCamera(camera, asked);
   ImGui::PopItemWidth();
   ImGui::Spacing();
-  ImGui::TextDisabled("%s", report.deviceName.c_str());
   if (ImGui::SmallButton("Keys (F1)")) help_ = !help_;
+  ImGui::SameLine();
+  ImGui::TextDisabled("%s", report.deviceName.c_str());
 }
 
 void Panels::drawContents(Document& document, Asked& asked) {

@@ -6,7 +6,7 @@
 namespace billow::viewer {
 namespace {
 
-constexpr std::uint32_t kAhead = 6;    // frames that are loaded before they are due
+constexpr std::uint32_t kAhead = 6;   // frames that are loaded before they are due
 constexpr float kLeastShare = 1e-4f;  // of a frame in a moment; less is not worth a frame
 
 }  // namespace

@@ -126,8 +126,8 @@ class Viewer {
       place();
       resetCamera();
     }
-    take(input);
     const std::uint32_t jumps = document_->timeline->jumps();
+    take(input);
     document_->timeline->advance(std::clamp(passed, 0.0, kMostSeconds));
     const Asked asked = panels_.draw(*document_, *camera_, report(passed));
     window_.setPicture(panels_.picture(), panels_.covered());
