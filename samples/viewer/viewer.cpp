@@ -25,7 +25,7 @@
 namespace billow::viewer {
 namespace {
 
-constexpr double kMostSeconds = 0.25;       // that pass between two pictures; a stall is no leap
+constexpr double kMostSeconds = 0.1;        // that pass between two pictures; a stall is no leap
 constexpr double kIdleSeconds = 0.5;        // between looks at a window in which nothing happens
 constexpr int kSettling = 3;                // pictures after an event until the panels have come to rest
 constexpr double kTurn = std::numbers::pi;  // radians over the height of the picture
