@@ -7,8 +7,8 @@
 #include <thread>
 #include <vector>
 
+#include "fake_stream.h"
 #include "gpu_fixture.h"
-#include "stream_fixture.h"
 
 namespace billow::tests {
 
