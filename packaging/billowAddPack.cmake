@@ -9,7 +9,7 @@ cmake_policy(VERSION 3.21...3.25)
 # seen: any file that is created or removed in it compiles the pack anew.
 #
 # TARGET: one that exists, which then needs the pack, or the name of a new one that is part of `all`.
-# SOURCE: what `billow compile` takes; relative to the source folder. Patterns in quotes.
+# SOURCE: what `billow compile` takes; relative to the source folder. Patterns in quotes, for # begins a comment.
 # PACK: relative to the binary folder.
 # ARGUMENT: of `billow compile`, such as --psnr 40.
 # Generators: Ninja and Makefiles.
