@@ -90,6 +90,7 @@ class Planner {
 
   // planner_room.cpp: what is given up
   void cancelUnwanted(double now);
+  void cancel(Item& item);
   void makeRoom(const Snapshot& snapshot, std::vector<Change>& changes);
   std::uint64_t roomNeeded(double now);
   void findVictims(const Snapshot& snapshot);

@@ -83,6 +83,16 @@ void Planner::makeRoom(const Snapshot& snapshot, std::vector<Change>& changes) {
   }
 }
 
+void Planner::cancel(Item& item) {
+  std::erase_if(loads_, [&](const Load& load) {
+    if (load.ticket != item.ticket) return false;
+    transport_.cancel(load.ticket);
+    loading_ -= load.bytes;
+    return true;
+  });
+  item.ticket = 0;
+}
+
 // Memory goes back to the device in blocks: after the budget shrank, frames in those that go are loaded anew elsewhere,
 // drawn ones before they leave, if there is room.
 void Planner::leaveBlocks(const Snapshot& snapshot, std::vector<Change>& changes) {
@@ -93,6 +103,8 @@ void Planner::leaveBlocks(const Snapshot& snapshot, std::vector<Change>& changes
     if (item.leaving || !transport_.mustLeave(*item.frame)) continue;
     found = true;
     const bool late = snapshot.update >= *shrunkFrom_ + kNoPatience;
+    // Beside it there may never be room for what is loaded in its place.
+    if (item.ticket != 0 && late) cancel(item);
     if (item.ticket != 0) continue;
     item.moving = item.drawn == passes_;
     if (item.moving && !late) continue;

@@ -71,7 +71,7 @@ Result<InstanceId> Players::add(const InstanceInfo& info, std::uint32_t clip) {
   view.clip = clip;
   view.playback = info.playback;
   view.priority = info.priority;
-  view.phase = wrapPhase(tracks_[clip].clip->timeline, info.playback.loop, info.time);
+  view.phase = phaseAt(tracks_[clip].clip->timeline, info.playback.loop, info.time, 0);
   views_.push_back(view);
   players_.emplace_back();
   shown_.emplace_back();
