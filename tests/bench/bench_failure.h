@@ -31,6 +31,12 @@ auto valueOf(Expected result) {
   return std::move(*result);
 }
 
+// The same where there is no value.
+template <class Expected>
+void require(const Expected& result) {
+  if (!result) fail(result.error().message);
+}
+
 }  // namespace billow::bench
 
 #endif  // BILLOW_TESTS_BENCH_FAILURE_H
