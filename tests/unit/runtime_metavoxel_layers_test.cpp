@@ -117,6 +117,21 @@ TEST_F(MetavoxelLayers, ExtinctionIsLinearInTheWeights) {
   gpu().waitIdle();
 }
 
+// In whatever order the device has filled the blocks of two layers.
+TEST_F(MetavoxelLayers, DrawnAgainIsTheSame) {
+  const format::Pack pack = openPack(movingCloudPack({.burning = true}));
+  const format::Pack shifted = openPack(movingCloudPack({.burning = true, .shift = 8}));
+  const auto first = upload(*renderer_, pack), second = upload(*renderer_, shifted);
+  const std::vector<Layer> layers{{first.get(), 0.3f}, {second.get(), 0.7f}};
+  const std::vector<float> depths = depthsOf(layers);
+  const headless::Picture picture = draw(layers);
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_EQ(depthsOf(layers), depths);
+    EXPECT_GT(pictureDecibels(picture, draw(layers)), 110);
+    metavoxels_ = make(smallConfig());
+  }
+}
+
 TEST_F(MetavoxelLayers, AStepOfNoTimeChangesNoBit) {
   for (const bool burning : {false, true}) {
     const format::Pack pack = openPack(movingCloudPack({.burning = burning, .velocity = {3, -2, 1}}));
