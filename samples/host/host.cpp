@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <billow/billow.hpp>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -24,6 +23,7 @@ constexpr uint32_t kWidth = 640, kHeight = 480;
 const vk::ApplicationInfo kApplication("host", 0, nullptr, 0, VK_API_VERSION_1_3);
 constexpr auto kGeneral = vk::ImageLayout::eGeneral;
 constexpr auto kAll = vk::PipelineStageFlagBits2::eAllCommands;
+const vk::ImageSubresourceRange kWhole(vk::ImageAspectFlagBits::eColor, 0, 1, 0, 1);
 
 struct Options {
   std::string pack, ppm;
@@ -31,7 +31,7 @@ struct Options {
   bool zUp = false;
 };
 
-// The first device, with what billow needs enabled, and one queue for all.
+// The first device, with what billow needs enabled, and one queue that draws, computes and presents.
 struct Gpu {
   vk::raii::Context loader;
   vk::raii::Instance instance;
@@ -41,19 +41,23 @@ struct Gpu {
       features;
   vk::raii::Device device = nullptr;
   vk::raii::Queue queue = nullptr;
+  uint32_t family = 0;
 
   explicit Gpu(const std::vector<const char*>& extensions)
       : instance(loader, vk::InstanceCreateInfo({}, &kApplication, {}, extensions)),
         physical(instance.enumeratePhysicalDevices().at(0)) {
-    features.get<vk::PhysicalDeviceFeatures2>().features.textureCompressionBC =
-        physical.getFeatures().textureCompressionBC;
+    constexpr auto both = vk::QueueFlagBits::eGraphics | vk::QueueFlagBits::eCompute;
+    const auto families = physical.getQueueFamilyProperties();
+    while (family < families.size() && (families[family].queueFlags & both) != both) ++family;
+    if (family == families.size()) throw std::runtime_error("no queue of the device both draws and computes");
+    features.get().features.textureCompressionBC = physical.getFeatures().textureCompressionBC;
     features.get<vk::PhysicalDeviceVulkan12Features>().setBufferDeviceAddress(true).setTimelineSemaphore(true);
     features.get<vk::PhysicalDeviceVulkan13Features>().setSynchronization2(true);
     const float priority = 1;
-    const vk::DeviceQueueCreateInfo queueInfo({}, 0, 1, &priority);  // family 0 draws, computes and presents
+    const vk::DeviceQueueCreateInfo queueInfo({}, family, 1, &priority);
     const std::vector<const char*> names(extensions.empty() ? 0 : 1, VK_KHR_SWAPCHAIN_EXTENSION_NAME);
     device = {physical, vk::DeviceCreateInfo({}, queueInfo, {}, names, nullptr, &features.get())};
-    queue = device.getQueue(0, 0);
+    queue = device.getQueue(family, 0);
   }
 
   vk::raii::DeviceMemory allocate(const vk::MemoryRequirements& needs, vk::MemoryPropertyFlags flags) const {
@@ -76,15 +80,13 @@ struct Image {
     memory = gpu.allocate(image.getMemoryRequirements(), vk::MemoryPropertyFlagBits::eDeviceLocal);
     image.bindMemory(*memory, 0);
     if (!(usage & vk::ImageUsageFlagBits::eStorage)) return;
-    const vk::ImageSubresourceRange all(vk::ImageAspectFlagBits::eColor, 0, 1, 0, 1);
-    view = {gpu.device, vk::ImageViewCreateInfo({}, *image, vk::ImageViewType::e2D, format, {}, all)};
+    view = {gpu.device, vk::ImageViewCreateInfo({}, *image, vk::ImageViewType::e2D, format, {}, kWhole)};
   }
 };
 
 void barrier(const vk::raii::CommandBuffer& commands, vk::Image image, vk::ImageLayout from, vk::ImageLayout to) {
   const vk::AccessFlags2 any = vk::AccessFlagBits2::eMemoryRead | vk::AccessFlagBits2::eMemoryWrite;
-  const vk::ImageSubresourceRange all(vk::ImageAspectFlagBits::eColor, 0, 1, 0, 1);
-  const vk::ImageMemoryBarrier2 change(kAll, any, kAll, any, from, to, 0, 0, image, all);
+  const vk::ImageMemoryBarrier2 change(kAll, any, kAll, any, from, to, 0, 0, image, kWhole);
   commands.pipelineBarrier2(vk::DependencyInfo({}, {}, {}, change));
 }
 
@@ -130,13 +132,9 @@ class Game {
   }
 
   void draw(vk::CommandBuffer commands, const Image& color, const Image& depth) {
-    billow::Background night;
-    night.top[0] = night.top[1] = night.top[2] = 0.03f;
-    night.opacity = 1;
     billow::DrawInfo info;
     info.space = space_.get();
     info.view = &view_;
-    info.background = &night;
     info.width = kWidth, info.height = kHeight;
     info.color = *color.view, info.depth = *depth.view;
     need(context_.draw(commands, info));
@@ -145,8 +143,7 @@ class Game {
   void print() const {
     const billow::Stats stats = context_.stats();
     std::printf("played %u late %u; %u frames resident, %.1f MB of GPU memory, %.1f MB with the space\n", played_,
-                late_, stats.framesResident, static_cast<double>(stats.gpuAllocated) * 1e-6,
-                static_cast<double>(stats.gpuBytesInAll) * 1e-6);
+                late_, stats.framesResident, double(stats.gpuAllocated) / 1e6, double(stats.gpuBytesInAll) / 1e6);
   }
 
   const billow::Context& context() const { return context_; }
@@ -156,7 +153,7 @@ class Game {
     billow::Device device;
     device.instance = *gpu.instance, device.physicalDevice = *gpu.physical, device.device = *gpu.device;
     device.getInstanceProcAddr = gpu.instance.getDispatcher()->vkGetInstanceProcAddr;
-    device.uploadQueue = *gpu.queue;
+    device.uploadQueue = *gpu.queue, device.uploadFamily = device.drawFamily = gpu.family;
     device.enabledFeatures = &static_cast<const VkPhysicalDeviceFeatures2&>(gpu.features.get());
     billow::Config config;
     config.framesInFlight = 1;
@@ -183,15 +180,15 @@ class Painter {
         color_(gpu, vk::Format::eR16G16B16A16Sfloat,
                vk::ImageUsageFlagBits::eStorage | vk::ImageUsageFlagBits::eTransferSrc),
         depth_(gpu, vk::Format::eR32Sfloat, vk::ImageUsageFlagBits::eStorage),
-        pool_(gpu.device, vk::CommandPoolCreateInfo()),
+        pool_(gpu.device, vk::CommandPoolCreateInfo({}, gpu.family)),
         commands_(std::move(gpu.device.allocateCommandBuffers({*pool_, vk::CommandBufferLevel::ePrimary, 1})[0])) {}
 
   void paint(Game& game, vk::Image target, vk::ImageLayout after, vk::Semaphore before = {}, vk::Semaphore done = {},
              vk::Buffer copy = {}) {
     pool_.reset();
     commands_.begin(vk::CommandBufferBeginInfo(vk::CommandBufferUsageFlagBits::eOneTimeSubmit));
-    barrier(commands_, *color_.image, vk::ImageLayout::eUndefined, kGeneral);
-    barrier(commands_, *depth_.image, vk::ImageLayout::eUndefined, kGeneral);
+    for (const Image* image : {&color_, &depth_})
+      barrier(commands_, *image->image, vk::ImageLayout::eUndefined, kGeneral);
     game.draw(*commands_, color_, depth_);
     barrier(commands_, *color_.image, kGeneral, kGeneral);
     barrier(commands_, target, vk::ImageLayout::eUndefined, kGeneral);
@@ -226,9 +223,8 @@ void playHeadless(const Options& options) {
                      vk::ImageUsageFlagBits::eTransferDst | vk::ImageUsageFlagBits::eTransferSrc);
   const vk::raii::Buffer buffer(gpu.device,
                                 vk::BufferCreateInfo({}, kWidth * kHeight * 4, vk::BufferUsageFlagBits::eTransferDst));
-  const vk::raii::DeviceMemory memory =
-      gpu.allocate(buffer.getMemoryRequirements(),
-                   vk::MemoryPropertyFlagBits::eHostVisible | vk::MemoryPropertyFlagBits::eHostCoherent);
+  const auto seen = vk::MemoryPropertyFlagBits::eHostVisible | vk::MemoryPropertyFlagBits::eHostCoherent;
+  const vk::raii::DeviceMemory memory = gpu.allocate(buffer.getMemoryRequirements(), seen);
   buffer.bindMemory(*memory, 0);
   for (uint32_t i = 0; i < options.frames; ++i) {
     game.update(1.0 / 60);
@@ -249,12 +245,13 @@ void playInWindow(const Options& options) {
   GLFWwindow* window = glfwCreateWindow(kWidth, kHeight, options.pack.c_str(), nullptr, nullptr);
   uint32_t count = 0;
   const char** names = glfwGetRequiredInstanceExtensions(&count);
-  if (names == nullptr) throw std::runtime_error("this Vulkan has no windows; use --headless");
+  if (window == nullptr || names == nullptr) throw std::runtime_error("no window for Vulkan; use --headless");
   const Gpu gpu(std::vector<const char*>(names, names + count));
   VkSurfaceKHR made{};
-  glfwCreateWindowSurface(*gpu.instance, window, nullptr, &made);
+  const VkResult result = glfwCreateWindowSurface(*gpu.instance, window, nullptr, &made);
   const vk::raii::SurfaceKHR surface(gpu.instance, made);
-  if (!gpu.physical.getSurfaceSupportKHR(0, *surface)) throw std::runtime_error("the device cannot present");
+  if (result != VK_SUCCESS || !gpu.physical.getSurfaceSupportKHR(gpu.family, *surface))
+    throw std::runtime_error("the device cannot present");
   const vk::raii::SwapchainKHR swapchain(
       gpu.device,
       vk::SwapchainCreateInfoKHR({}, *surface, 3, vk::Format::eB8G8R8A8Srgb, vk::ColorSpaceKHR::eSrgbNonlinear,
@@ -263,10 +260,10 @@ void playInWindow(const Options& options) {
   const vk::raii::Semaphore taken(gpu.device, vk::SemaphoreCreateInfo()), drawn(gpu.device, vk::SemaphoreCreateInfo());
   Game game(gpu, options);
   Painter painter(gpu);
-  auto before = std::chrono::steady_clock::now();
+  double before = glfwGetTime();
   for (uint32_t frame = 1; glfwWindowShouldClose(window) == GLFW_FALSE; ++frame) {
-    const auto now = std::chrono::steady_clock::now();
-    game.update(std::chrono::duration<double>(now - before).count());
+    const double now = glfwGetTime();
+    game.update(now - before);
     before = now;
     const uint32_t image = swapchain.acquireNextImage(UINT64_MAX, *taken).second;
     painter.paint(game, vk::Image(images[image]), vk::ImageLayout::ePresentSrcKHR, *taken, *drawn);
@@ -290,11 +287,12 @@ int main(int count, char** words) try {
     if (word == "--headless") options.frames = static_cast<uint32_t>(std::stoul(value()));
     if (word == "--ppm") options.ppm = value();
     if (word == "--z-up") options.zUp = true;
-    if (!word.starts_with("--")) options.pack = word;
+    if (!word.starts_with("-")) options.pack = word;
+    if (word.starts_with("-") && word != "--headless" && word != "--ppm" && word != "--z-up")
+      throw std::runtime_error(word + ": unknown option");
   }
   if (options.pack.empty()) throw std::runtime_error("usage: billow_host PACK [--headless N [--ppm FILE]] [--z-up]");
   options.frames > 0 ? playHeadless(options) : playInWindow(options);
-  return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "billow_host: %s\n", error.what());
   return 1;
