@@ -12,7 +12,8 @@ play() {  # play PROGRAM PACK: 40 frames, which the validation layer watches
   if grep -qi 'validation\|VUID' "$out"; then exit 1; fi
   local played late
   read -r played late < <(sed -n 's/^played \([0-9]*\) late \([0-9]*\).*/\1 \2/p' "$out")
-  [ "$late" -eq 0 ] && [ "$played" -ge 30 ]
+  [ "$late" -eq 0 ]  # two lines: the first of a && list ends no script
+  [ "$played" -ge 30 ]
   # Fire: many different pixels, and bright ones.
   python3 - "$build/picture.ppm" <<'END'
 import sys
