@@ -130,6 +130,41 @@ TEST(StreamMemory, PiecesOfTheRingNeverOverlap) {
   }
 }
 
+// As the uploader goes about it: pieces into a batch, at most kBatches pending, executed some at a time or none.
+TEST(StreamMemory, PiecesOfPendingBatchesAreNotGivenOut) {
+  constexpr std::uint64_t kSize = 64 << 10;
+  constexpr std::uint64_t kBatches = runtime::RingEnds::kBatches;
+  std::uint32_t full = 0;
+  for (std::uint32_t seed = 0; seed < 20; ++seed) {
+    std::mt19937 random(seed);
+    RingSpace ring(kSize);
+    runtime::RingEnds ends;
+    ByteMap model(kSize);
+    std::vector<std::vector<RingSpace::Piece>> batches(1);  // by number - 1; the last is being recorded
+    std::uint64_t executed = 0;
+    for (int step = 0; step < 2000; ++step) {
+      const std::uint64_t closed = batches.size() - 1;
+      for (std::uint64_t count = random() % 2; count != 0 && executed < closed; --count) {
+        for (const RingSpace::Piece& piece : batches[executed]) model.set(piece.offset, piece.bytes, false);
+        ++executed;
+      }
+      ends.executed(executed, ring);
+      full += closed - executed == kBatches;
+      if (closed - executed == kBatches) continue;
+      const auto piece = ring.take(256, 256 + random() % 12000, 4);
+      if (piece.bytes != 0) {
+        ASSERT_TRUE(model.isFree(piece.offset, piece.bytes)) << "the device still reads it";
+        model.set(piece.offset, piece.bytes, true);
+        batches.back().push_back(piece);
+      }
+      if (batches.back().empty() || random() % 3 == 0) continue;
+      ends.close(closed + 1, ring);
+      batches.emplace_back();
+    }
+  }
+  EXPECT_GT(full, 100u);
+}
+
 struct Counter {
   std::atomic<std::uint64_t> now = 0, peak = 0;
   std::atomic<bool> refuses = false;

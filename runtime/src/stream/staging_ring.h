@@ -3,6 +3,7 @@
 #define BILLOW_RUNTIME_STREAM_STAGING_RING_H
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -16,8 +17,8 @@ class RingSpace {
  public:
   explicit RingSpace(std::uint64_t size) : size_(size) {}
 
-  // A piece in one run: at least `least` bytes (a multiple of `unit`), at most `most`, whole units. Empty where there is
-  // no room now. least <= size().
+  // A piece in one run: at least `least` bytes (a multiple of `unit`), at most `most`, whole units. Empty where there
+  // is no room now. least <= size().
   struct Piece {
     std::uint64_t offset = 0, bytes = 0;
   };
@@ -33,6 +34,21 @@ class RingSpace {
   std::uint64_t head_ = 0, tail_ = 0;
 };
 
+// Where the batches that are on their way end in the ring. Batch n may be closed once batch n - kBatches is executed.
+class RingEnds {
+ public:
+  static constexpr std::uint64_t kBatches = 8;
+
+  void close(std::uint64_t batch, const RingSpace& space) { ends_[batch % ends_.size()] = space.head(); }
+  void executed(std::uint64_t batch, RingSpace& space) const {
+    if (batch != 0) space.release(ends_[batch % ends_.size()]);
+  }
+
+ private:
+  // The last one that was executed is looked up beside kBatches that are pending.
+  std::array<std::uint64_t, 2 * kBatches> ends_{};
+};
+
 class StagingRing {
  public:
   // Pieces begin at multiples: what copies into images want.
@@ -45,6 +61,7 @@ class StagingRing {
     return buffer_.mapped().subspan(piece.offset, piece.bytes);
   }
   RingSpace space{0};
+  RingEnds ends;
 
  private:
   Buffer buffer_;

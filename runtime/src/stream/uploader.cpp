@@ -110,7 +110,7 @@ Result<bool> Uploader::open() {
   const auto done = completed();
   if (!done) return tl::unexpected(done.error());
   seen_ = *done;
-  if (*done != 0) ring_.space.release(ringEnds_[*done % kBatches]);
+  ring_.ends.executed(*done, ring_.space);
   if (recording_ != VK_NULL_HANDLE) return true;
   if (closed_ - *done >= kBatches) return false;
   const VkCommandBuffer commands = commands_[(closed_ + 1) % kBatches];
@@ -130,7 +130,7 @@ Result<void> Uploader::close() {
   if (recording_ == VK_NULL_HANDLE) return {};
   const VkResult result = device_.api.vkEndCommandBuffer(std::exchange(recording_, VK_NULL_HANDLE));
   if (result != VK_SUCCESS) return vulkanError("vkEndCommandBuffer", result);
-  ringEnds_[(closed_ + 1) % kBatches] = ring_.space.head();
+  ring_.ends.close(closed_ + 1, ring_.space);
   recordedBytes_ = 0;
   ++closed_;
   if (closedCall_.call != nullptr) closedCall_.call(closedCall_.context);

@@ -59,7 +59,7 @@ class Uploader {
   std::uint64_t bytesUploaded() const { return bytesUploaded_; }
 
  private:
-  static constexpr std::uint64_t kBatches = 8;  // command buffers
+  static constexpr std::uint64_t kBatches = RingEnds::kBatches;  // command buffers
 
   // The least part of an atlas that one copy may have on the queue: a row of blocks, or slices.
   struct AtlasUnit {
@@ -86,7 +86,6 @@ class Uploader {
   VkCommandPool pool_ = VK_NULL_HANDLE;
   VkSemaphore semaphore_ = VK_NULL_HANDLE;
   std::array<VkCommandBuffer, kBatches> commands_{};
-  std::array<std::uint64_t, kBatches> ringEnds_{};  // the ring's head when the batch was closed
   VkCommandBuffer recording_ = VK_NULL_HANDLE;
   std::uint64_t recordedBytes_ = 0;
   bool emptyReady_ = false;
