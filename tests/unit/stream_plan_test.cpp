@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "fake_stream.h"
+#include "stream/players.h"
 
 namespace billow::tests {
 namespace {
@@ -86,6 +87,21 @@ TEST_F(StreamPlan, PlaysWithoutAHoldWhereAllFits) {
   }
   EXPECT_EQ(stream->stats().framesResident, 12u + 1u) << "each frame once, and means of the first";
   EXPECT_FALSE(stream->takeError());
+}
+
+// Planning may be just swapping when a snapshot is there: it is filled anew then, and nothing that it told is lost.
+TEST_F(StreamPlan, NoticesOfASnapshotThatWasNotTakenGoFirst) {
+  auto clip = std::make_shared<runtime::Clip>();
+  clip->same = {0};
+  clip->levels.resize(2);
+  runtime::Players players;
+  runtime::Snapshot snapshot;
+  for (std::uint32_t number = 0; number < 4; ++number) {
+    EXPECT_EQ(players.openClip(clip), number);
+    players.fill(snapshot);
+    ASSERT_EQ(snapshot.notices.size(), number + 1);
+    for (std::uint32_t i = 0; i <= number; ++i) EXPECT_EQ(snapshot.notices[i].clip, i);
+  }
 }
 
 TEST_F(StreamPlan, BlendsByTheFraction) {

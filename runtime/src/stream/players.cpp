@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "api.h"
@@ -325,7 +326,10 @@ void Players::giveBack(Transport& transport, std::uint64_t update) {
 
 void Players::fill(Snapshot& snapshot) {
   snapshot.instances = views_;
-  snapshot.notices.swap(notices_);
+  // Those of a snapshot that could not be handed over go first.
+  snapshot.notices.insert(snapshot.notices.end(), std::make_move_iterator(notices_.begin()),
+                          std::make_move_iterator(notices_.end()));
+  notices_.clear();
 }
 
 void Players::dropFrames() {
