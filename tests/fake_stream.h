@@ -152,6 +152,7 @@ class FakeTransport final : public runtime::Transport {
   void releaseCpu(std::uint64_t bytes) override { reserved_ -= bytes; }
   runtime::TransportStats stats() const override { return {.gpuAllocated = used_, .gpuUsed = used_}; }
   void run(void (*job)(void*), void* context) override { job(context); }
+  void read(void (*job)(void*), void* context) override { job(context); }
 
   const FakeFrame& known(const runtime::Frame* frame) const { return known_.at(frame); }
   bool isRetired(const runtime::Frame* frame) const {

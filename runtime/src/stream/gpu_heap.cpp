@@ -13,8 +13,19 @@ constexpr std::uint64_t kPage = std::uint64_t{64} << 10;  // blocks are multiple
 constexpr std::uint64_t kOneBlockBelow = std::uint64_t{64} << 20;
 constexpr std::uint64_t kBlocks = 16;
 
-constexpr VkBufferUsageFlags kBufferUsage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
-                                            VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
+constexpr VkBufferUsageFlags kBufferUsage =
+    VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
+
+constexpr std::uint32_t kTriesLeftOut = 256;  // for another block, after the device had no memory for one
+
+// Where memory is short the one frame fails that wanted it; all else is the device's failure.
+tl::unexpected<Error> heapError(const char* call, VkResult result) {
+  auto error = vulkanError(call, result);
+  if (result == VK_ERROR_OUT_OF_DEVICE_MEMORY || result == VK_ERROR_OUT_OF_HOST_MEMORY) {
+    error.value().code = ErrorCode::memory;
+  }
+  return error;
+}
 
 Result<VkBuffer> makeBuffer(const Device& device, std::uint64_t bytes, VkMemoryRequirements& needs) {
   auto info = begin<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
@@ -25,7 +36,7 @@ Result<VkBuffer> makeBuffer(const Device& device, std::uint64_t bytes, VkMemoryR
   VkBuffer buffer = VK_NULL_HANDLE;
   const VkResult result =
       device.api.vkCreateBuffer(device.host.device, &info, device.host.allocationCallbacks, &buffer);
-  if (result != VK_SUCCESS) return vulkanError("vkCreateBuffer", result);
+  if (result != VK_SUCCESS) return heapError("vkCreateBuffer", result);
   device.api.vkGetBufferMemoryRequirements(device.host.device, buffer, &needs);
   return buffer;
 }
@@ -88,7 +99,7 @@ Result<VkImage> GpuHeap::makeImage(const AtlasShape& shape) {
   VkImage image = VK_NULL_HANDLE;
   const VkResult result =
       device_.api.vkCreateImage(device_.host.device, &info, device_.host.allocationCallbacks, &image);
-  if (result != VK_SUCCESS) return vulkanError("vkCreateImage", result);
+  if (result != VK_SUCCESS) return heapError("vkCreateImage", result);
   return image;
 }
 
@@ -127,8 +138,9 @@ Result<std::unique_ptr<HeapMemory>> GpuHeap::allocate(std::uint64_t bufferBytes,
     const std::lock_guard lock(mutex_);
     const std::uint64_t bytes = aligned(bufferBytes) + aligned(image.size);
     if (bytes > budget_) {
-      return failure(ErrorCode::budget, "the frame takes " + std::to_string(bytes) + " bytes of GPU memory, which the " +
-                                            std::to_string(budget_) + " of gpuBudget do not hold");
+      return failure(ErrorCode::budget, "the frame takes " + std::to_string(bytes) +
+                                            " bytes of GPU memory, which the " + std::to_string(budget_) +
+                                            " of gpuBudget do not hold");
     }
     for (const auto& [part, needed, alignment] : {std::tuple{&memory->buffer, aligned(bufferBytes), granule_},
                                                   std::tuple{&memory->atlas, aligned(image.size), image.alignment}}) {
@@ -155,16 +167,16 @@ Result<void> GpuHeap::bindImage(const AtlasShape& shape, HeapMemory& memory) {
   if (!image) return tl::unexpected(image.error());
   memory.image = *image;
   nameObject(device_, VK_OBJECT_TYPE_IMAGE, memory.image, "billow frame atlas");
-  VkResult result = device_.api.vkBindImageMemory(device_.host.device, memory.image, memory.atlas.block->memory,
-                                                  memory.atlas.offset);
-  if (result != VK_SUCCESS) return vulkanError("vkBindImageMemory", result);
+  VkResult result =
+      device_.api.vkBindImageMemory(device_.host.device, memory.image, memory.atlas.block->memory, memory.atlas.offset);
+  if (result != VK_SUCCESS) return heapError("vkBindImageMemory", result);
   auto info = begin<VkImageViewCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO);
   info.image = memory.image;
   info.viewType = VK_IMAGE_VIEW_TYPE_3D;
   info.format = shape.format();
   info.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
   result = device_.api.vkCreateImageView(device_.host.device, &info, device_.host.allocationCallbacks, &memory.view);
-  if (result != VK_SUCCESS) return vulkanError("vkCreateImageView", result);
+  if (result != VK_SUCCESS) return heapError("vkCreateImageView", result);
   return {};
 }
 
@@ -201,7 +213,7 @@ GpuHeap::Part GpuHeap::takeOfBlocks(std::uint64_t bytes, std::uint64_t alignment
 std::uint64_t GpuHeap::newBlockBytes(std::uint64_t bytes) {
   const std::uint64_t usual = std::max(budget_ < kOneBlockBelow ? budget_ : budget_ / kBlocks, bytes);
   const std::uint64_t least = (bytes + kPage - 1) / kPage * kPage;
-  if (exhausted_) return 0;
+  if (exhausted_ != 0 && --exhausted_ != 0) return 0;
   const auto room = [&] { return budget_ > allocated_ ? budget_ - allocated_ : 0; };
   if (room() < least) dropEmpty(true);
   // The host's budget for all of billow may be the tighter one.
@@ -220,8 +232,8 @@ Result<HeapBlock*> GpuHeap::addBlock(std::uint64_t bytes, bool image) {
     destroy(*block);
     if (filled.error().code != ErrorCode::memory) return tl::unexpected(filled.error());
     // Frames of blocks that there are may make room.
-    exhausted_ = !blocks_.empty();
-    if (!exhausted_) return tl::unexpected(filled.error());
+    if (blocks_.empty()) return tl::unexpected(filled.error());
+    exhausted_ = kTriesLeftOut;
     return nullptr;
   }
   blocks_.push_back(std::move(block));
@@ -256,7 +268,7 @@ Result<void> GpuHeap::fillBlock(HeapBlock& block, std::uint64_t bytes) {
   if (result != VK_SUCCESS) return vulkanError("vkAllocateMemory", result);
   if (block.images) return {};
   result = device_.api.vkBindBufferMemory(device, block.buffer, block.memory, 0);
-  if (result != VK_SUCCESS) return vulkanError("vkBindBufferMemory", result);
+  if (result != VK_SUCCESS) return heapError("vkBindBufferMemory", result);
   auto address = begin<VkBufferDeviceAddressInfo>(VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO);
   address.buffer = block.buffer;
   block.address = device_.api.vkGetBufferDeviceAddress(device, &address);
@@ -286,7 +298,7 @@ void GpuHeap::dropEmpty(bool all) {
     if (block->ranges.used() != 0) return false;
     if (!all && !block->leaving && block->ranges.size() <= usual && allocated_ <= budget_) return false;
     destroy(*block);
-    exhausted_ = false;
+    exhausted_ = 0;
     return true;
   });
   chooseLeaving();
@@ -295,6 +307,7 @@ void GpuHeap::dropEmpty(bool all) {
 void GpuHeap::setBudget(std::uint64_t bytes) {
   const std::lock_guard lock(mutex_);
   budget_ = bytes;
+  exhausted_ = 0;
   dropEmpty(false);
 }
 

@@ -99,7 +99,8 @@ class GpuHeap {
   std::uint64_t budget_;
   std::uint64_t granule_ = 256;  // all offsets and sizes are multiples, so that buffers and images may be neighbours
   std::uint32_t bufferType_ = 0, imageType_ = 0;  // memory types
-  bool exhausted_ = false;  // the device had no memory for another block; until one was given back
+  // The device had no memory for another block: tries to leave out, unless one is given back or the budget set.
+  std::uint32_t exhausted_ = 0;
   std::vector<std::unique_ptr<HeapBlock>> blocks_;
   std::map<std::array<std::uint32_t, 3>, VkMemoryRequirements> imageNeeds_;  // by shape
   std::atomic<std::uint64_t> allocated_ = 0, used_ = 0, peak_ = 0;

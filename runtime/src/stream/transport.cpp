@@ -191,6 +191,7 @@ std::optional<LoadStage> TransportCore::stage(std::uint64_t ticket) const {
 
 void TransportCore::take(std::vector<Arrival>& arrivals) {
   progress();
+  decltype(loads_) gone(loads_.get_allocator());  // destroyed without the lock
   const std::lock_guard lock(mutex_);
   for (auto it = loads_.begin(); it != loads_.end();) {
     Load& load = it->second;
@@ -208,7 +209,7 @@ void TransportCore::take(std::vector<Arrival>& arrivals) {
       arrival.frame = std::move(load.frame);
     }
     tickets_.erase(load.order.ticket);
-    it = loads_.erase(it);
+    gone.insert(loads_.extract(it++));
   }
 }
 

@@ -95,6 +95,8 @@ class Transport {
   // Runs job(context) on billow's threads or the host's; never where the Transport is destroyed before its turn. Throws
   // std::bad_alloc.
   virtual void run(void (*job)(void* context), void* context) = 0;
+  // As run(), where files are read: such a job may wait for a disk.
+  virtual void read(void (*job)(void* context), void* context) = 0;
 };
 
 }  // namespace billow::runtime

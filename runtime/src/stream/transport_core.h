@@ -73,6 +73,7 @@ class TransportCore final : public Transport {
   void releaseCpu(std::uint64_t bytes) override;
   TransportStats stats() const override;
   void run(void (*job)(void* context), void* context) override { jobs_.run({job, context}); }
+  void read(void (*job)(void* context), void* context) override { jobs_.read({job, context}); }
 
  private:
   struct Retired {
@@ -102,8 +103,8 @@ class TransportCore final : public Transport {
   void askPump();
   void decode(Load& load);
   void describe(Load& load, std::unique_ptr<HeapMemory> memory);
-  Load* nextToCopy();
-  bool copyOne(Load& load);  // false where pumping cannot go on now
+  Load* nextToCopy(std::uint64_t after);
+  bool copyOne(Load& load);  // false where ring or memory have no room for it now
   void copied(Load& load);
   void countWanted();
   // Ends a load that this thread has: it arrives with the frame, or with an error, or goes where it was cancelled.

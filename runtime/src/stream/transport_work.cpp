@@ -170,7 +170,7 @@ void TransportCore::decode(Load& load) {
   load.upload = {.buffer = load.loaded.buffer, .atlas = load.loaded.atlas, .shape = load.loaded.shape};
   const auto need = heap_.need(load.loaded.buffer.size(), load.loaded.shape);
   if (!need) {
-    fail(need.error());
+    if (need.error().code == ErrorCode::vulkan) fail(need.error());
     return finish(load, need.error());
   }
   load.gpuBytes = *need;
@@ -201,10 +201,12 @@ void TransportCore::describe(Load& load, std::unique_ptr<HeapMemory> memory) {
   frame.memory_ = std::move(memory);
 }
 
-Load* TransportCore::nextToCopy() {
+// What is half copied goes first: it has memory already. Then those that wait for some, behind number `after`.
+Load* TransportCore::nextToCopy(std::uint64_t after) {
   const std::lock_guard lock(mutex_);
-  for (auto& [number, load] : loads_) {
-    if (load.step == Step::waiting || load.step == Step::copying) return &load;
+  if (Load* load = first(Step::copying)) return load;
+  for (auto it = loads_.upper_bound(after); it != loads_.end(); ++it) {
+    if (it->second.step == Step::waiting) return &it->second;
   }
   return nullptr;
 }
@@ -213,8 +215,16 @@ void TransportCore::pump(void* context) {
   auto& core = *static_cast<TransportCore*>(context);
   core.pumping_.begin();
   core.ringBlocked_ = false;
-  while (Load* load = core.nextToCopy()) {
-    if (!core.copyOne(*load)) break;
+  std::uint64_t noRoom = 0;
+  try {
+    while (Load* load = core.nextToCopy(noRoom)) {
+      const std::uint64_t number = load->number;
+      if (core.copyOne(*load)) continue;
+      if (core.ringBlocked_) break;
+      noRoom = number;  // one behind it may be small enough
+    }
+  } catch (const std::bad_alloc&) {
+    // The load stays where it is, and is tried again when anything else has moved.
   }
   if (auto closed = core.uploader_.close(); !closed) core.fail(closed.error());
   core.countWanted();
@@ -305,6 +315,7 @@ void TransportCore::finish(Load& load, std::optional<Error> error) {
 void TransportCore::bury(void* context) {
   auto& core = *static_cast<TransportCore*>(context);
   std::vector<std::unique_ptr<ResidentFrame>> frames;
+  decltype(core.loads_) gone(core.loads_.get_allocator());  // destroyed without the lock
   {
     const std::lock_guard lock(core.mutex_);
     frames.swap(core.buried_);
@@ -314,10 +325,11 @@ void TransportCore::bury(void* context) {
         continue;
       }
       if (it->second.frame != nullptr) (core.failure_ ? core.kept_ : frames).push_back(std::move(it->second.frame));
-      it = core.loads_.erase(it);
+      gone.insert(core.loads_.extract(it++));
     }
   }
   frames.clear();
+  gone.clear();
   core.askPump();
   core.wake();
 }
