@@ -122,10 +122,11 @@ Result<Opened> finish(format::Pack pack, std::shared_ptr<AsyncSource> source, As
   return opened;
 }
 
-class TableReaderImpl final : public TableReader {
+class TableReaderImpl final : public TableReader, public std::enable_shared_from_this<TableReaderImpl> {
  public:
-  TableReaderImpl(std::shared_ptr<AsyncSource> source, AssetId asset, Reserve reserve, std::function<void()> done)
-      : source_(std::move(source)), asset_(asset), held_(reserve), done_(std::move(done)) {}
+  TableReaderImpl(std::shared_ptr<AsyncSource> source, AssetId asset, Reserve reserve, ReadsInFlight& inFlight,
+                  std::function<void()> done)
+      : source_(std::move(source)), asset_(asset), held_(reserve), inFlight_(inFlight), done_(std::move(done)) {}
 
   void start() override {
     size_ = source_->size();
@@ -150,8 +151,17 @@ class TableReaderImpl final : public TableReader {
       failed_ = true;
       return done_();
     }
+    inFlight_.add();
     source_->read(offset, pieces_.back().bytes,
-                  {.call = [](void* self, bool success) { static_cast<TableReaderImpl*>(self)->came(success); },
+                  {.call =
+                       [](void* context, bool success) {
+                         // Who is told of the end may let go of the reader before this returns.
+                         auto self = static_cast<TableReaderImpl*>(context)->shared_from_this();
+                         ReadsInFlight& inFlight = self->inFlight_;
+                         self->came(success);
+                         self.reset();
+                         inFlight.remove();
+                       },
                    .context = this});
   }
 
@@ -180,6 +190,7 @@ class TableReaderImpl final : public TableReader {
   std::shared_ptr<AsyncSource> source_;
   AssetId asset_;
   Held held_;
+  ReadsInFlight& inFlight_;
   std::function<void()> done_;
   std::uint64_t size_ = 0;
   std::vector<Piece> pieces_;
@@ -208,9 +219,9 @@ Result<Opened> openFile(const std::string& path, AssetId asset, Reserve reserve)
   });
 }
 
-std::unique_ptr<TableReader> TableReader::make(std::shared_ptr<AsyncSource> source, AssetId asset, Reserve reserve,
-                                               std::function<void()> done) {
-  return std::make_unique<TableReaderImpl>(std::move(source), asset, reserve, std::move(done));
+std::shared_ptr<TableReader> TableReader::make(std::shared_ptr<AsyncSource> source, AssetId asset, Reserve reserve,
+                                               ReadsInFlight& inFlight, std::function<void()> done) {
+  return std::make_shared<TableReaderImpl>(std::move(source), asset, reserve, inFlight, std::move(done));
 }
 
 }  // namespace billow::runtime

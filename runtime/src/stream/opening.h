@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "clip.h"
+#include "page_reads.h"
 
 namespace billow::runtime {
 
@@ -30,9 +31,10 @@ Result<Opened> openFile(const std::string& path, AssetId asset, Reserve reserve)
 // The tables of a host's source: read piece by piece without a thread that waits, each when the one before has come.
 class TableReader {
  public:
-  // `done` is called once, on the thread of the last read; perhaps before start() returns.
-  static std::unique_ptr<TableReader> make(std::shared_ptr<AsyncSource> source, AssetId asset, Reserve reserve,
-                                           std::function<void()> done);
+  // `done` is called once, on the thread of the last read; perhaps before start() returns. It must not throw.
+  // `inFlight` counts reads until their callbacks have returned; reader and source live as long.
+  static std::shared_ptr<TableReader> make(std::shared_ptr<AsyncSource> source, AssetId asset, Reserve reserve,
+                                           ReadsInFlight& inFlight, std::function<void()> done);
   virtual ~TableReader() = default;
   virtual void start() = 0;
   // After `done`: checks what was read.

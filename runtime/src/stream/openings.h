@@ -3,8 +3,10 @@
 #define BILLOW_RUNTIME_STREAM_OPENINGS_H
 
 #include <condition_variable>
+#include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "opening.h"
@@ -24,12 +26,15 @@ class Openings {
   Openings(const Openings&) = delete;
   Openings& operator=(const Openings&) = delete;
 
+  // Goes on with what stop() left.
   void start(Transport& transport);
-  // Waits for the packs that are on their way, reads of the host's included. take() still gives them.
+  // Waits for the host's reads in flight and for jobs that have begun; those that have not do nothing any more. take()
+  // still gives what has ended.
   void stop();
 
   // On the calling thread, which waits for the host's reads.
   Result<Opened> openHere(const PackSource& source, AssetId asset);
+  // Throws std::bad_alloc, and then opens nothing.
   void openLater(const PackSource& source, AssetId asset, bool reload);
   // Those that have ended since; none while one is just being handed over.
   void take(std::vector<OpenDone>& done);
@@ -37,19 +42,25 @@ class Openings {
  private:
   struct Opening {
     Openings& self;
+    PackSource source;
     AssetId asset;
     bool reload;
-    std::string path;
-    std::unique_ptr<TableReader> reader;  // of a host's source
+    std::shared_ptr<TableReader> reader = {};  // of a host's source
+    // By mutex_.
+    bool begun = false, dropped = false;
+    std::optional<Result<Opened>> opened = {};  // it has ended
   };
+  void post(Opening& opening);
+  static void tablesCame(Opening& opening);
   static void finish(void* opening);
-  void end(const Opening& opening, Result<Opened> opened);
+  void end(Opening& opening, Result<Opened> opened);
 
   Transport* transport_ = nullptr;
+  ReadsInFlight reads_;
   std::mutex mutex_;
   std::condition_variable ended_;
-  std::uint32_t running_ = 0;   // by mutex_
-  std::vector<OpenDone> done_;  // by mutex_
+  std::uint32_t running_ = 0;    // by mutex_
+  std::list<Opening> openings_;  // by mutex_
 };
 
 }  // namespace billow::runtime
