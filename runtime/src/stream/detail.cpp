@@ -97,7 +97,11 @@ void Detail::rank(const Snapshot& snapshot) {
   for (std::uint32_t i = 0; i < snapshot.instances.size(); ++i) {
     const InstanceView& instance = snapshot.instances[i];
     if (!(instance.priority > 0)) continue;
-    ranked_.push_back({.instance = i, .level = 0, .importance = static_cast<float>(importanceOf(snapshot, instance))});
+    // Sorting wants numbers that can be compared.
+    const double importance = importanceOf(snapshot, instance);
+    constexpr double kMost = std::numeric_limits<float>::max();
+    const double sound = std::isnan(importance) ? 0 : std::clamp(importance, 0.0, kMost);
+    ranked_.push_back({.instance = i, .level = 0, .importance = static_cast<float>(sound)});
   }
   std::sort(ranked_.begin(), ranked_.end(), [&](const Ranked& a, const Ranked& b) {
     // In steps, so that what is about as large keeps its order.

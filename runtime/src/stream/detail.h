@@ -19,6 +19,7 @@ struct PlannedItem {
   std::uint64_t marked = 0;              // the pass in which it was counted last
   std::uint64_t wanted = 0;              // the pass in which it was wanted last
   std::uint64_t drawn = 0;               // the pass in which an instance drew it last
+  std::uint64_t alone = 0;               // and in which one drew nothing else
   std::uint32_t want = 0;                // its place in the pass's list
   std::uint32_t place = 0;               // among the residents
   double used = 0;                       // seconds, when it was wanted last

@@ -70,7 +70,8 @@ struct Change {
   enum class Kind {
     arrive,   // `frame` is resident, in place of what the item had before
     evict,    // give the item's frame back unless it is drawn; a Notice says which
-    force,    // give it back though it is drawn
+    force,    // give it back though it is drawn, unless an instance has nothing else
+    seize,    // give it back whatever it is drawn for
     discard,  // `frame` is of a clip that is closed
     level,    // the instance is to be drawn at this level
     fail,     // the item will not come

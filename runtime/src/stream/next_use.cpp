@@ -20,15 +20,15 @@ struct Paths {
   std::vector<Coming> forward, backward;
 };
 
-void seed(const Clip& clip, const InstanceView& instance, Paths& paths) {
-  const Moment moment = momentAt(clip.timeline, instance.playback.loop, instance.phase, 0);
+void seed(const Clip& clip, const InstanceView& instance, double phase, Paths& paths) {
+  const Moment moment = momentAt(clip.timeline, instance.playback.loop, phase, 0);
   const double speed = std::abs(instance.playback.speed);
   const auto offer = [&](Coming& to, double seconds) {
     if (seconds < to.seconds) to = {seconds, speed, instance.playback.loop};
   };
   // What stands needs nothing but what it draws.
   if (speed == 0) return;
-  if (goesForward(clip.timeline, instance.playback.loop, instance.phase, instance.playback.speed > 0)) {
+  if (goesForward(clip.timeline, instance.playback.loop, phase, instance.playback.speed > 0)) {
     offer(paths.forward[moment.a], 0);
     offer(paths.forward[moment.b], moment.untilB / speed);
   } else {
@@ -58,14 +58,19 @@ void sweep(const Timeline& timeline, Paths& paths) {
 void findNextUses(const Snapshot& snapshot, std::vector<PlannedClip>& clips, std::uint64_t number) {
   std::vector<Paths> paths(clips.size());
   for (const InstanceView& instance : snapshot.instances) {
-    PlannedClip& clip = clips[instance.clip];
-    if (clip.clip == nullptr || !(instance.priority > 0)) continue;
-    Paths& path = paths[instance.clip];
-    if (path.forward.empty()) {
-      path.forward.resize(clip.clip->frames());
-      path.backward.resize(clip.clip->frames());
-    }
-    seed(*clip.clip, instance, path);
+    if (clips[instance.clip].clip == nullptr || !(instance.priority > 0)) continue;
+    const Clip& clip = *clips[instance.clip].clip;
+    const auto add = [&](std::uint32_t which, double phase) {
+      Paths& path = paths[which];
+      if (path.forward.empty()) {
+        path.forward.resize(clips[which].clip->frames());
+        path.backward.resize(clips[which].clip->frames());
+      }
+      seed(*clips[which].clip, instance, phase, path);
+    };
+    add(instance.clip, instance.phase);
+    if (instance.successor == format::kNone || clips[instance.successor].clip == nullptr) continue;
+    add(instance.successor, successorPhase(clip, *clips[instance.successor].clip, instance));
   }
   for (std::size_t i = 0; i < clips.size(); ++i) {
     if (paths[i].forward.empty()) continue;

@@ -5,6 +5,7 @@
 namespace billow::runtime {
 void Planner::pass(Snapshot& snapshot, std::vector<Change>& changes, std::vector<StreamError>& errors) {
   ++passes_;
+  update_ = snapshot.update;
   if (snapshot.gpuBudget < budget_) shrunkFrom_ = snapshot.update;
   budget_ = snapshot.gpuBudget;
   takeNotices(snapshot, changes);
@@ -27,7 +28,12 @@ void Planner::findVelocity(const Snapshot& snapshot) {
   for (const InstanceView& instance : snapshot.instances) {
     PlannedClip& clip = clips_[instance.clip];
     if (clip.clip == nullptr || !clip.clip->velocity) continue;
-    if (instance.playback.interpolation == Interpolation::advect) clip.velocity = true;
+    if (clip.velocity || instance.playback.interpolation != Interpolation::advect) continue;
+    clip.velocity = true;
+    // With the grids of velocity they are larger.
+    for (Item& item : clip.items) {
+      if (!item.resident) item.bytes = 0;
+    }
   }
 }
 
@@ -71,7 +77,8 @@ void Planner::order(const Snapshot& snapshot) {
     }
     if (!submit(want, bytes, snapshot.now)) break;
   }
-  if (!blocked) blockedFrom_.reset();
+  // Over the budget is blocked too: forceRoom() counts its patience from when that began.
+  if (!blocked && resident_ + loading_ <= budget_) blockedFrom_.reset();
   if (blocked && !blockedFrom_) blockedFrom_ = snapshot.update;
 }
 

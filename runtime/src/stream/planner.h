@@ -83,7 +83,8 @@ class Planner {
   void gather(const Snapshot& snapshot);
   void gatherNow(const InstanceView& instance, std::uint32_t clip, double phase, double importance,
                  std::uint32_t level);
-  void gatherComing(const InstanceView& instance, double importance, std::uint32_t level);
+  void gatherComing(const InstanceView& instance, std::uint32_t clip, double phase, double importance,
+                    std::uint32_t level);
   void want(std::uint32_t clip, std::uint32_t frame, std::uint32_t level, Tier tier, double seconds, double importance);
   bool anyLevel(const PlannedClip& clip, std::uint32_t frame) const;
   void markDrawn(const Snapshot& snapshot);
@@ -119,8 +120,9 @@ class Planner {
   std::vector<Victim> victims_;
   std::vector<Leaving> leaving_;  // retired; the device may still read them
   std::vector<Arrival> arrivals_;
-  std::set<std::pair<std::uint32_t, std::uint32_t>> toldPages_;  // of assets: errors that the host knows
+  std::set<std::pair<const OpenPack*, std::uint32_t>> toldPages_;  // errors that the host knows
   std::uint64_t passes_ = 0;
+  std::uint64_t update_ = 0;  // of the snapshot
   std::uint64_t nextTicket_ = 1;
   std::uint64_t budget_ = 0;
   std::uint64_t slack_ = 0;                  // bytes of the budget that lie in gaps too small for what is loading

@@ -52,6 +52,8 @@ void Planner::takeNotices(Snapshot& snapshot, std::vector<Change>& changes) {
                 [&](const Leaving& frame) { return frame.update + config_.framesInFlight < snapshot.update; });
   for (Notice& notice : snapshot.notices) {
     if (notice.clip >= clips_.size()) clips_.resize(notice.clip + 1);
+    // A pass that ran out of memory has dealt with it.
+    if (notice.kind == Notice::Kind::opened && notice.opened == nullptr) continue;
     PlannedClip& clip = clips_[notice.clip];
     if (notice.kind == Notice::Kind::opened) {
       clip = {};
@@ -82,7 +84,9 @@ void Planner::takeNotices(Snapshot& snapshot, std::vector<Change>& changes) {
 void Planner::closeClip(std::uint32_t number) {
   PlannedClip& clip = clips_[number];
   for (std::uint32_t item = 0; item < clip.items.size(); ++item) {
-    if (clip.items[item].resident) setAbsent(number, item);
+    if (!clip.items[item].resident) continue;
+    leaving_.push_back({update_, clip.items[item].bytes});
+    setAbsent(number, item);
   }
   std::erase_if(loads_, [&](const Load& load) {
     if (load.clip != number) return false;
@@ -90,8 +94,8 @@ void Planner::closeClip(std::uint32_t number) {
     loading_ -= load.bytes;
     return true;
   });
-  const std::uint32_t asset = clip.clip->asset.value;
-  toldPages_.erase(toldPages_.lower_bound({asset, 0}), toldPages_.upper_bound({asset, format::kNone}));
+  const OpenPack* const pack = clip.clip->pack.get();
+  toldPages_.erase(toldPages_.lower_bound({pack, 0}), toldPages_.upper_bound({pack, format::kNone}));
   clip = {};
 }
 
@@ -103,7 +107,10 @@ void Planner::takeArrivals(double now, std::vector<Change>& changes, std::vector
         std::find_if(loads_.begin(), loads_.end(), [&](const Load& load) { return load.ticket == arrival.ticket; });
     if (found == loads_.end()) {
       // It was cancelled when it had all but arrived.
-      if (arrival.frame) changes.push_back({.kind = Change::Kind::discard, .frame = std::move(*arrival.frame)});
+      if (arrival.frame) {
+        leaving_.push_back({update_, (*arrival.frame)->stats().allocatedBytes});
+        changes.push_back({.kind = Change::Kind::discard, .frame = std::move(*arrival.frame)});
+      }
       continue;
     }
     const Load load = *found;
@@ -122,7 +129,10 @@ void Planner::takeArrivals(double now, std::vector<Change>& changes, std::vector
 
 void Planner::arrived(const Load& load, Arrival& arrival, std::vector<Change>& changes) {
   Item& item = clips_[load.clip].items[load.item];
-  if (item.resident) setAbsent(load.clip, load.item);
+  if (item.resident) {
+    leaving_.push_back({update_, item.bytes});
+    setAbsent(load.clip, load.item);
+  }
   setResident(load.clip, load.item, **arrival.frame);
   item.velocity = load.velocity;
   item.backOff = 0;
@@ -140,28 +150,32 @@ void Planner::failed(const Load& load, const Arrival& arrival, double now, std::
   const Clip& clip = *planned.clip;
   Item& item = planned.items[load.item];
   const Error& error = arrival.frame.error();
-  const bool first = item.backOff == 0;
+  bool tell = item.backOff == 0;
   if (error.code == ErrorCode::vulkan) {
     if (std::exchange(lost_, true)) return;
+    tell = true;
   } else if (passing(error)) {
-    item.backOff = first ? kFirstBackOff : std::min(2 * item.backOff, kLongestBackOff);
+    item.backOff = tell ? kFirstBackOff : std::min(2 * item.backOff, kLongestBackOff);
     item.retryAt = now + static_cast<double>(item.backOff);
   } else {
-    item.corrupt = true;
+    item.corrupt = tell = true;  // though it failed for another reason before
     changes.push_back({.kind = Change::Kind::fail, .clip = load.clip, .item = load.item});
   }
-  if (!first) return;
+  if (!tell) return;
+  // That it cannot be read does not hide that it is damaged.
   if (arrival.page) {
-    if (!toldPages_.insert({clip.asset.value, *arrival.page}).second) return;
+    if (!toldPages_.insert({clip.pack.get(), *arrival.page << 1 | (item.corrupt ? 1u : 0u)}).second) return;
   }
+  const char* const then = lost_          ? "; nothing more is loaded until there is a new device"
+                           : item.corrupt ? "; all else plays on"
+                                          : "; it will be tried again";
   errors.push_back({.code = error.code,
                     .asset = clip.asset,
                     .volume = clip.volume,
                     .frame = clip.frameOf(load.item),
                     .page = arrival.page,
                     .message = "frame " + std::to_string(clip.frameOf(load.item)) + " of volume " +
-                               std::to_string(clip.volume) + ": " + error.message +
-                               (item.corrupt ? "; all else plays on" : "; it will be tried again")});
+                               std::to_string(clip.volume) + ": " + error.message + then});
 }
 
 }  // namespace billow::runtime

@@ -100,7 +100,11 @@ void Planner::leaveBlocks(const Snapshot& snapshot, std::vector<Change>& changes
   bool found = false;
   for (const Resident& resident : residents_) {
     Item& item = clips_[resident.clip].items[resident.item];
-    if (item.leaving || !transport_.mustLeave(*item.frame)) continue;
+    if (item.leaving) continue;
+    if (!transport_.mustLeave(*item.frame)) {
+      item.moving = false;
+      continue;
+    }
     found = true;
     const bool late = snapshot.update >= *shrunkFrom_ + kNoPatience;
     // Beside it there may never be room for what is loaded in its place.
@@ -108,7 +112,7 @@ void Planner::leaveBlocks(const Snapshot& snapshot, std::vector<Change>& changes
     if (item.ticket != 0) continue;
     item.moving = item.drawn == passes_;
     if (item.moving && !late) continue;
-    evict(resident.clip, resident.item, late ? Change::Kind::force : Change::Kind::evict, changes);
+    evict(resident.clip, resident.item, late ? Change::Kind::seize : Change::Kind::evict, changes);
   }
   if (!found && snapshot.update > *shrunkFrom_) shrunkFrom_.reset();
 }
@@ -149,8 +153,8 @@ void Planner::forceRoom(const Snapshot& snapshot, std::vector<Change>& changes) 
     PlannedClip& clip = clips_[instance.clip];
     if (clip.clip == nullptr || instance.drawnCount < (last ? 1u : 2u)) continue;
     const std::uint32_t item = instance.drawn[instance.drawnCount - 1];
-    if (!unwanted(clip.items[item])) continue;
-    return evict(instance.clip, item, Change::Kind::force, changes);
+    if (!unwanted(clip.items[item]) || (!last && clip.items[item].alone == passes_)) continue;
+    return evict(instance.clip, item, last ? Change::Kind::seize : Change::Kind::force, changes);
   }
 }
 

@@ -79,14 +79,16 @@ void Planner::gatherNow(const InstanceView& instance, std::uint32_t number, doub
   }
 }
 
-void Planner::gatherComing(const InstanceView& instance, double importance, std::uint32_t level) {
-  const Clip& clip = *clips_[instance.clip].clip;
+void Planner::gatherComing(const InstanceView& instance, std::uint32_t number, double phase, double importance,
+                           std::uint32_t level) {
+  const Clip& clip = *clips_[number].clip;
+  level = std::min(level, clip.levelCount() - 1);
   const double latency = std::min(latency_, kLongestLatency);
   const double horizon = config_.prefetchSeconds + latency;
-  comingFrames(clip.timeline, instance.playback, instance.phase, horizon, [&](std::uint32_t frame, double seconds) {
-    const Item& item = clips_[instance.clip].items[clip.item(frame, level)];
+  comingFrames(clip.timeline, instance.playback, phase, horizon, [&](std::uint32_t frame, double seconds) {
+    const Item& item = clips_[number].items[clip.item(frame, level)];
     const bool late = !item.resident && item.ticket == 0 && seconds < 0.8 * latency;
-    want(instance.clip, frame, level, late ? kLate : kSoon, seconds, importance);
+    want(number, frame, level, late ? kLate : kSoon, seconds, importance);
   });
 }
 
@@ -100,8 +102,18 @@ void Planner::gather(const Snapshot& snapshot) {
     if (instance.successor != format::kNone && clips_[instance.successor].clip != nullptr) {
       const double phase = successorPhase(*clips_[instance.clip].clip, *clips_[instance.successor].clip, instance);
       gatherNow(instance, instance.successor, phase, importance, ranked.level);
+      gatherComing(instance, instance.successor, phase, importance, ranked.level);
     }
-    gatherComing(instance, importance, ranked.level);
+    gatherComing(instance, instance.clip, instance.phase, importance, ranked.level);
+  }
+  if (shrunkFrom_) {
+    // Held ones are of no moment, but drawn.
+    for (const Resident& resident : residents_) {
+      const PlannedClip& clip = clips_[resident.clip];
+      const Item& item = clip.items[resident.item];
+      if (!item.moving || item.leaving || item.drawn != passes_) continue;
+      want(resident.clip, clip.clip->frameOf(resident.item), clip.clip->levelOf(resident.item), kNow, 0, 0);
+    }
   }
   const double step = std::max(config_.prefetchSeconds, 0.01) / 32;
   const auto steps = [&](double seconds) { return static_cast<int>(std::min(seconds / step, 1e6)); };
@@ -127,6 +139,7 @@ void Planner::markDrawn(const Snapshot& snapshot) {
     for (std::uint32_t i = 0; i < instance.drawnCount; ++i) {
       clip.items[instance.drawn[i]].drawn = passes_;
       clip.items[instance.drawn[i]].used = snapshot.now;
+      if (instance.drawnCount == 1) clip.items[instance.drawn[i]].alone = passes_;
     }
   }
 }

@@ -1,6 +1,7 @@
 #include "planning.h"
 
 #include <iterator>
+#include <new>
 #include <utility>
 
 namespace billow::runtime {
@@ -58,7 +59,11 @@ void Planning::work() {
       if (stopped_) return;
       wanted_ = false;
     }
-    pass();
+    try {
+      pass();
+    } catch (const std::bad_alloc&) {
+      // The next one goes on.
+    }
   }
 }
 

@@ -16,11 +16,19 @@ double lengthOfColumn(const std::array<double, 12>& m, std::size_t column) {
   return std::sqrt(m[column] * m[column] + m[4 + column] * m[4 + column] + m[8 + column] * m[8 + column]);
 }
 
+bool allFinite(const std::array<double, 12>& transform) {
+  return std::all_of(transform.begin(), transform.end(), [](double x) { return std::isfinite(x); });
+}
+
+// Within what can be squared and summed.
+double bounded(double x) {
+  constexpr double kMost = 1e30;
+  return std::isnan(x) ? 0 : std::clamp(x, -kMost, kMost);
+}
+
 bool sane(const InstanceInfo& info) {
-  const bool transform =
-      std::all_of(info.objectToWorld.begin(), info.objectToWorld.end(), [](double x) { return std::isfinite(x); });
-  return transform && std::isfinite(info.time) && std::isfinite(info.playback.speed) && std::isfinite(info.priority) &&
-         info.priority >= 0;
+  return allFinite(info.objectToWorld) && std::isfinite(info.time) && std::isfinite(info.playback.speed) &&
+         std::isfinite(info.priority) && info.priority >= 0;
 }
 
 }  // namespace
@@ -120,13 +128,14 @@ void Players::place(std::uint32_t index) {
     view.centre[row] = m[4 * row + 3];
     for (std::size_t column = 0; column < 3; ++column) view.centre[row] += m[4 * row + column] * clip.centre[column];
   }
-  view.scale = std::max({lengthOfColumn(m, 0), lengthOfColumn(m, 1), lengthOfColumn(m, 2)});
-  view.radius = clip.radius * view.scale;
+  for (double& x : view.centre) x = bounded(x);
+  view.scale = bounded(std::max({lengthOfColumn(m, 0), lengthOfColumn(m, 1), lengthOfColumn(m, 2)}));
+  view.radius = bounded(clip.radius * view.scale);
 }
 
 void Players::setTransform(InstanceId id, const std::array<double, 12>& objectToWorld) {
   const std::uint32_t index = indexOf(id);
-  if (index == format::kNone) return;
+  if (index == format::kNone || !allFinite(objectToWorld)) return;
   transforms_[index] = objectToWorld;
   place(index);
 }
@@ -190,15 +199,12 @@ bool visitSuccessor(const std::vector<Track>& tracks, const InstanceView& view, 
   return visit(track, track.clip->same[moment.b]);
 }
 
-bool residentOrFailed(const Track& track, std::uint32_t frame) {
+bool anyResident(const Track& track, std::uint32_t frame) {
   const std::uint32_t levels = track.clip->levelCount();
-  bool allFailed = true;
   for (std::uint32_t level = 0; level < levels; ++level) {
-    const Track::Slot& slot = track.slots[std::size_t{frame} * levels + level];
-    if (slot.frame != nullptr) return true;
-    allFailed = allFailed && slot.failed;
+    if (track.slots[std::size_t{frame} * levels + level].frame != nullptr) return true;
   }
-  return allFailed;
+  return false;
 }
 
 bool allFailed(const Track& track, std::uint32_t frame) {
@@ -214,7 +220,11 @@ bool allFailed(const Track& track, std::uint32_t frame) {
 bool Players::succeed(AssetId asset) {
   for (const InstanceView& view : views_) {
     if (tracks_[view.clip].clip->asset != asset || view.successor == format::kNone || !(view.priority > 0)) continue;
-    if (!visitSuccessor(tracks_, view, residentOrFailed)) return false;
+    // One frame of the moment will do: on a slow disk both may never be there at once.
+    if (visitSuccessor(tracks_, view,
+                       [](const Track& track, std::uint32_t frame) { return !anyResident(track, frame); })) {
+      return false;
+    }
   }
   for (std::uint32_t i = 0; i < views_.size(); ++i) {
     InstanceView& view = views_[i];
@@ -243,6 +253,21 @@ void Players::retire(std::unique_ptr<ResidentFrame> frame, Transport& transport)
   ++retired_.frames;
   retired_.bytes += frame->stats().allocatedBytes;
   transport.retire(std::move(frame));
+}
+
+// Whether an instance that draws the item would draw nothing without it.
+bool Players::isLast(std::uint32_t clip, std::uint32_t item) const {
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    const Shown& shown = shown_[i];
+    if (views_[i].clip != clip || shown.count == 0) continue;
+    bool draws = false, more = false;
+    for (std::uint32_t layer = 0; layer < shown.count; ++layer) {
+      draws = draws || shown.items[layer] == item;
+      more = more || (shown.items[layer] != item && tracks_[clip].slots[shown.items[layer]].frame != nullptr);
+    }
+    if (draws && !more) return true;
+  }
+  return false;
 }
 
 void Players::take(std::span<Change> changes, Transport& transport) {
@@ -276,7 +301,12 @@ void Players::take(std::span<Change> changes, Transport& transport) {
         slot.frame = std::move(change.frame);
         break;
       case Change::Kind::force:
+      case Change::Kind::seize:
         if (slot.frame == nullptr) break;
+        if (change.kind == Change::Kind::force && isLast(change.clip, change.item)) {
+          notices_.push_back({.kind = Notice::Kind::refused, .clip = change.clip, .item = change.item, .opened = {}});
+          break;
+        }
         retire(std::move(slot.frame), transport);
         notices_.push_back({.kind = Notice::Kind::retired, .clip = change.clip, .item = change.item, .opened = {}});
         break;

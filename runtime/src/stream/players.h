@@ -74,7 +74,8 @@ class Players {
 
   // Clips of an asset get successors, by the volumes that instances play; or lose them again.
   void setSuccessors(AssetId asset, std::span<const std::uint32_t> clips);
-  // Whether everything that is drawn now of the asset is resident of its successors; they then take their place.
+  // Whether each instance of the asset could draw something of its moment from its successor; they then take their
+  // place.
   bool succeed(AssetId asset);
   bool successorFailed(AssetId asset) const;
 
@@ -97,6 +98,7 @@ class Players {
   std::uint32_t indexOf(InstanceId id) const;
   void place(std::uint32_t index);
   void removeAt(std::uint32_t index);
+  bool isLast(std::uint32_t clip, std::uint32_t item) const;
   void retire(std::unique_ptr<ResidentFrame> frame, Transport& transport);
 
   std::vector<Track> tracks_;
