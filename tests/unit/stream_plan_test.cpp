@@ -104,6 +104,116 @@ TEST_F(StreamPlan, NoticesOfASnapshotThatWasNotTakenGoFirst) {
   }
 }
 
+TEST_F(StreamPlan, OnlyAShrunkBudgetTakesTheLastFrameOfAnInstance) {
+  auto clip = std::make_shared<runtime::Clip>();
+  clip->same = {0};
+  clip->levels.resize(2);
+  runtime::Players players;
+  FakeTransport transport({}, {});
+  ASSERT_TRUE(players.add({}, players.openClip(clip)));
+  const auto change = [&](runtime::Change::Kind kind, std::unique_ptr<runtime::ResidentFrame> frame) {
+    runtime::Change made{.kind = kind, .clip = 0, .item = 0, .instance = {}, .frame = std::move(frame)};
+    players.take({&made, 1}, transport);
+    players.advance(0, 1);
+    runtime::Snapshot snapshot;
+    players.fill(snapshot);
+    return std::move(snapshot.notices);
+  };
+  change(runtime::Change::Kind::arrive, std::make_unique<runtime::ResidentFrame>());
+  EXPECT_EQ(players.views()[0].drawnCount, 1u);
+  auto notices = change(runtime::Change::Kind::force, nullptr);
+  ASSERT_EQ(notices.size(), 1u);
+  EXPECT_EQ(notices[0].kind, runtime::Notice::Kind::refused);
+  EXPECT_EQ(players.views()[0].drawnCount, 1u);
+  notices = change(runtime::Change::Kind::seize, nullptr);
+  ASSERT_EQ(notices.size(), 1u);
+  EXPECT_EQ(notices[0].kind, runtime::Notice::Kind::retired);
+  EXPECT_EQ(players.views()[0].drawnCount, 0u);
+  for (int i = 0; i < 5; ++i) transport.update();
+}
+
+TEST_F(StreamPlan, TransformsThatAreNoNumbersAndHugeOnesAreBorne) {
+  const PackFile file(sequencePack(4, evenBricks));
+  FakeStream stream;
+  const AssetId asset = open(stream, file);
+  std::vector<InstanceId> ids;
+  for (int i = 0; i < 40; ++i) ids.push_back(add(stream, asset, {.speed = 0}));
+  for (int i = 0; i < 40; ++i) {
+    std::array<double, 12> transform{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    const double values[] = {1e200, std::nan(""), 1e300, -1e308, 0, 1, HUGE_VAL};
+    for (std::size_t at = 0; at < 12; ++at) {
+      if (i % 3 != 0 || at % 4 == 3) transform[at] = values[(static_cast<std::size_t>(i) + at * (at % 3)) % 7];
+    }
+    stream->setTransform(ids[static_cast<std::size_t>(i)], transform);
+  }
+  for (int i = 0; i < 20; ++i) stream->update({.seconds = kTick, .view = runtime::View{}});
+  for (const InstanceId id : ids) {
+    expectSound(stream, stream->drawable(id));
+    EXPECT_GT(stream->drawable(id).count, 0u);
+  }
+}
+
+TEST_F(StreamPlan, ALostDeviceIsToldThoughLoadsFailedBefore) {
+  const PackFile file(sequencePack(4, evenBricks));
+  FakeStream stream;
+  bool lost = false;
+  stream.transport().fault = [&](const runtime::LoadOrder&) -> std::optional<runtime::Error> {
+    return runtime::Error{.code = lost ? runtime::ErrorCode::vulkan : runtime::ErrorCode::memory, .message = "no"};
+  };
+  add(stream, open(stream, file), {.speed = 0});
+  stream.update(10, kTick);
+  while (const auto error = stream->takeError()) EXPECT_EQ(error->code, runtime::ErrorCode::memory);
+  lost = true;
+  stream.update(60, kTick);
+  const auto error = stream->takeError();
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code, runtime::ErrorCode::vulkan);
+  EXPECT_EQ(error->message.find("tried again"), std::string::npos) << error->message;
+  EXPECT_FALSE(stream->takeError());
+}
+
+TEST_F(StreamPlan, AReloadOfWhichNothingComesIsGivenUp) {
+  const PackFile old(sequencePack(4, evenBricks)), fresh(sequencePack(4, evenBricks));
+  FakeStream stream;
+  const AssetId asset = open(stream, old);
+  const InstanceId id = add(stream, asset, {});
+  stream.update(20, kTick);
+  const format::Pack* const pack = stream->pack(asset);
+  stream.transport().fault = [&](const runtime::LoadOrder& order) -> std::optional<runtime::Error> {
+    if (&order.pack->pack == pack) return std::nullopt;
+    return runtime::Error{.code = runtime::ErrorCode::memory, .message = "not now"};
+  };
+  ASSERT_TRUE(stream->reload(asset, {.path = fresh.path()}));
+  stream.update(20 * 60, kTick);
+  EXPECT_FALSE(stream->reload(asset, {.path = fresh.path()})) << "it is still tried";
+  stream.update(11 * 60, kTick);
+  EXPECT_EQ(stream->pack(asset), pack);
+  EXPECT_GT(stream->drawable(id).count, 0u);
+  EXPECT_TRUE(stream->takeError());
+  stream.transport().fault = nullptr;
+  ASSERT_TRUE(stream->reload(asset, {.path = fresh.path()}));
+  stream.update(60, kTick);
+  EXPECT_NE(stream->pack(asset), pack);
+}
+
+TEST_F(StreamPlan, AnAssetThatFailedIsOpenedByAReload) {
+  const PackFile file(std::vector<std::byte>(100));
+  FakeStream stream;
+  const auto asset = stream->openLater({.path = file.path()});
+  ASSERT_TRUE(asset);
+  stream.update();
+  EXPECT_EQ(stream->state(*asset), runtime::Streamer::AssetState::failed);
+  EXPECT_TRUE(stream->takeError());
+  file.write(sequencePack(4, evenBricks));
+  ASSERT_TRUE(stream->reload(*asset, {.path = file.path()}));
+  EXPECT_FALSE(stream->reload(*asset, {.path = file.path()})) << "it is being opened";
+  stream.update();
+  EXPECT_EQ(stream->state(*asset), runtime::Streamer::AssetState::ready);
+  const InstanceId id = add(stream, *asset, {});
+  stream.update(10, kTick);
+  EXPECT_GT(stream->drawable(id).count, 0u);
+}
+
 TEST_F(StreamPlan, BlendsByTheFraction) {
   const PackFile file(sequencePack(4, evenBricks));
   FakeStream stream;

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <iterator>
 #include <map>
+#include <mutex>
 #include <utility>
 
 #include "api.h"
@@ -15,6 +17,7 @@
 namespace billow::runtime {
 namespace {
 
+constexpr double kLongestReload = 30;     // seconds until what is drawn must be resident of the new pack
 constexpr std::size_t kMostErrors = 256;  // that the host has not taken yet; the newest are dropped
 
 struct Asset {
@@ -25,6 +28,7 @@ struct Asset {
   // What is to take its place.
   bool reloading = false;
   bool told = false;  // of an error in it
+  double waited = 0;  // seconds since it was open
   std::optional<Opened> next;
   std::vector<std::uint32_t> nextClips;
 };
@@ -83,7 +87,12 @@ class StreamerImpl final : public Streamer {
       if (auto fits = checkSource(source); !fits) return tl::unexpected(fits.error());
       const AssetId id{nextAsset_++};
       assets_[id.value].id = id;
-      openings_.openLater(source, id, false);
+      try {
+        openings_.openLater(source, id, false);
+      } catch (...) {
+        assets_.erase(id.value);
+        throw;
+      }
       return id;
     });
   }
@@ -102,12 +111,17 @@ class StreamerImpl final : public Streamer {
   Result<void> reload(AssetId id, const PackSource& source) override {
     return guarded<void>([&]() -> Result<void> {
       if (auto fits = checkSource(source); !fits) return tl::unexpected(fits.error());
+      if (state(id) == AssetState::failed) {
+        openings_.openLater(source, id, false);
+        assets_[id.value].state = AssetState::opening;
+        return {};
+      }
       if (state(id) != AssetState::ready) return failure(ErrorCode::argument, "reload: the asset is not open");
       Asset& asset = assets_[id.value];
       if (asset.reloading) return failure(ErrorCode::argument, "reload: the asset is being reloaded");
+      openings_.openLater(source, id, true);
       asset.reloading = true;
       asset.told = false;
-      openings_.openLater(source, id, true);
       return {};
     });
   }
@@ -196,6 +210,9 @@ class StreamerImpl final : public Streamer {
   }
 
   void tell(StreamError error) {
+    // Where memory is short every load says so.
+    const auto same = [&](const StreamError& known) { return known.code == error.code && known.asset == error.asset; };
+    if (error.code == ErrorCode::memory && std::any_of(errors_.begin(), errors_.end(), same)) return;
     log(LogLevel::error, error.message);
     if (errors_.size() < kMostErrors) errors_.push_back(std::move(error));
   }
@@ -271,6 +288,7 @@ class StreamerImpl final : public Streamer {
     }
     asset.nextClips = openClips(*done.opened);
     asset.next = std::move(*done.opened);
+    asset.waited = 0;
     players_.setSuccessors(asset.id, asset.nextClips);
   }
 
@@ -285,9 +303,10 @@ class StreamerImpl final : public Streamer {
     asset.reloading = false;
   }
 
-  void finishReloads() {
+  void finishReloads(double seconds) {
     for (auto& [id, asset] : assets_) {
       if (!asset.next) continue;
+      asset.waited += seconds;
       if (players_.successorFailed(asset.id)) {
         abandonReload(asset);
       } else if (players_.succeed(asset.id)) {
@@ -298,6 +317,8 @@ class StreamerImpl final : public Streamer {
         asset.next.reset();
         asset.reloading = false;
         log(LogLevel::information, "a reloaded pack has taken its place");
+      } else if (asset.waited > kLongestReload) {
+        abandonReload(asset);
       }
     }
   }
@@ -306,7 +327,7 @@ class StreamerImpl final : public Streamer {
     const double seconds = std::isfinite(info.seconds) ? std::max(info.seconds, 0.0) : 0;
     now_ += seconds;
     ++stats_.updates;
-    dying_.clear();
+    bury();
     if (transport_ == nullptr) return players_.advance(seconds, stats_.updates);
     transport_->update();
     planning_.take(changes_, met_, plan_);
@@ -314,7 +335,7 @@ class StreamerImpl final : public Streamer {
     changes_.clear();
     takeErrors();
     takeOpened();
-    finishReloads();
+    finishReloads(seconds);
     players_.advance(seconds, stats_.updates);
     players_.giveBack(*transport_, stats_.updates);
     if (planning_.wantsSnapshot()) {
@@ -323,6 +344,25 @@ class StreamerImpl final : public Streamer {
     }
     planning_.request();
     count();
+  }
+
+  // Packs take their time to destroy, and a host's source may take more.
+  void bury() {
+    if (dying_.empty()) return;
+    if (transport_ == nullptr) return dying_.clear();
+    {
+      const std::lock_guard lock(graveMutex_);
+      std::move(dying_.begin(), dying_.end(), std::back_inserter(graves_));
+    }
+    dying_.clear();
+    transport_->run(
+        [](void* context) {
+          auto& self = *static_cast<StreamerImpl*>(context);
+          std::vector<Opened> graves;  // destroyed without the lock
+          const std::lock_guard lock(self.graveMutex_);
+          graves.swap(self.graves_);
+        },
+        this);
   }
 
   void takeErrors() {
@@ -387,6 +427,7 @@ class StreamerImpl final : public Streamer {
     plan_ = {};
     loadedBefore_ = 0;
     transport_.reset();
+    graves_.clear();
   }
 
   StreamConfig config_;
@@ -397,6 +438,8 @@ class StreamerImpl final : public Streamer {
   Players players_;
   std::map<std::uint32_t, Asset> assets_;
   std::vector<Opened> dying_;
+  std::mutex graveMutex_;
+  std::vector<Opened> graves_;  // by graveMutex_; those of update()s before, which a job destroys
   std::uint32_t nextAsset_ = 1;
   double now_ = 0;
   // Scratch of update().

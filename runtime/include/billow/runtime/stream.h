@@ -74,7 +74,8 @@ struct Log {
   void* user = nullptr;
 };
 
-// Who submits uploads to HostDevice::uploadQueue. Vulkan wants a queue to be used by one thread at a time.
+// Who submits uploads to HostDevice::uploadQueue. Vulkan wants a queue to be used by one thread at a time:
+// Renderer::upload() submits to it too, so it is called on the thread of update(), and not at all beside `own`.
 enum class Submission {
   inUpdate,  // update() does: the queue may be the one that the host draws with
   own,       // billow's threads do, as soon as there is something: the queue is billow's alone
@@ -208,19 +209,23 @@ class Streamer {
   // Null unless ready. Valid until the next update() after close() or a reload that finished.
   virtual const format::Pack* pack(AssetId asset) const = 0;
   // Opens `source` beside the asset; once it is open and what is drawn now is resident of it, it takes the asset's
-  // place. Instances keep their time. A source that fails leaves all as it was, and an error.
+  // place. Instances keep their time. A source that fails, or of which what is drawn has not come within 30 seconds,
+  // leaves all as it was, and an error. Instances without priority draw nothing of it until they have some again. An
+  // asset that failed to open is opened from `source` as by openLater().
   virtual Result<void> reload(AssetId asset, const PackSource& source) = 0;
   // Its instances go too.
   virtual void close(AssetId asset) = 0;
 
   virtual Result<InstanceId> addInstance(const InstanceInfo& info) = 0;
   virtual void removeInstance(InstanceId instance) = 0;
+  // These leave all as it is where there is no such instance, or a number is not finite.
   virtual void setPlayback(InstanceId instance, const Playback& playback) = 0;
   virtual void setTransform(InstanceId instance, const std::array<double, 12>& objectToWorld) = 0;
   virtual void setPriority(InstanceId instance, float priority) = 0;
   virtual void seek(InstanceId instance, double time) = 0;
 
-  // A smaller budget takes effect as soon as the frames in flight allow.
+  // A smaller budget takes effect as soon as the frames in flight allow. With a CPU budget that is not more than
+  // stagingBytes and the tables of open packs nothing is loaded.
   virtual void setBudget(std::uint64_t gpuBytes, std::uint64_t cpuBytes) = 0;
 
   // Advances every instance, takes in what has arrived, and says what to draw. Never waits.
@@ -229,11 +234,13 @@ class Streamer {
   virtual UploadWait wait() const = 0;
 
   virtual StreamStats stats() const = 0;
-  // Each error once, the oldest first.
+  // Each error once, the oldest first. Until it is taken, a shortage of memory is told once for an asset.
   virtual std::optional<StreamError> takeError() = 0;
 
   // After the device was lost, or before the host replaces it: detach() gives back everything on it and forgets what
-  // was resident; attach() goes on with a Renderer of the new device. Between them update() advances time alone.
+  // was resident; attach() goes on with a Renderer of the new device. Between them update() advances time alone. At
+  // detach() no commands that draw frames may be pending, unless the device is lost. Packs that are being opened go on
+  // after attach().
   virtual void detach() = 0;
   virtual Result<void> attach(Renderer& renderer) = 0;
 
