@@ -9,7 +9,8 @@ tl::unexpected<Error> failure(ErrorCode code, std::string message) {
 }
 
 tl::unexpected<Error> vulkanError(const char* call, VkResult result) {
-  return failure(ErrorCode::vulkan, std::string(call) + " failed with VkResult " + std::to_string(result));
+  const ErrorCode code = result == VK_ERROR_DEVICE_LOST ? ErrorCode::deviceLost : ErrorCode::vulkan;
+  return failure(code, std::string(call) + " failed with VkResult " + std::to_string(result));
 }
 
 Device& deviceOf(Renderer& renderer) {

@@ -117,6 +117,9 @@ Device& deviceOf(Renderer& renderer);
 bool takeBytes(Device& device, std::uint64_t bytes);
 
 tl::unexpected<Error> vulkanError(const char* call, VkResult result);
+inline bool isVulkan(ErrorCode code) {
+  return code == ErrorCode::vulkan || code == ErrorCode::deviceLost;
+}
 tl::unexpected<Error> failure(ErrorCode code, std::string message);
 
 }  // namespace billow::runtime

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "api.h"
 #include "planner.h"
 
 namespace billow::runtime {
@@ -151,7 +152,7 @@ void Planner::failed(const Load& load, const Arrival& arrival, double now, std::
   Item& item = planned.items[load.item];
   const Error& error = arrival.frame.error();
   bool tell = item.backOff == 0;
-  if (error.code == ErrorCode::vulkan) {
+  if (isVulkan(error.code)) {
     if (std::exchange(lost_, true)) return;
     tell = true;
   } else if (passing(error)) {

@@ -250,7 +250,7 @@ bool TransportCore::copyOne(Load& load) {
     auto memory = guarded<std::unique_ptr<HeapMemory>>(
         [&] { return heap_.allocate(load.loaded.buffer.size(), load.loaded.shape); });
     if (!memory) {
-      if (memory.error().code == ErrorCode::vulkan) fail(memory.error());
+      if (isVulkan(memory.error().code)) fail(memory.error());
       finish(load, memory.error());
       return true;
     }
@@ -260,7 +260,7 @@ bool TransportCore::copyOne(Load& load) {
     load.step = Step::copying;
   }
   if (auto done = uploader_.copy(load.upload); !done) {
-    if (done.error().code == ErrorCode::vulkan) fail(done.error());
+    if (isVulkan(done.error().code)) fail(done.error());
     finish(load, done.error());
     return true;
   }

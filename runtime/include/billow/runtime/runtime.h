@@ -33,6 +33,7 @@ enum class ErrorCode {
   budget,       // the frame does not fit into the budget; nothing was allocated
   unsupported,  // the device lacks something that billow needs
   vulkan,       // a Vulkan call failed
+  deviceLost,   // a Vulkan call failed, and all others will: the device is lost
   argument,     // an argument is outside of what its comment allows
   memory,       // the system's memory, not the GPU's, or another of its resources ran out
 };
@@ -243,14 +244,15 @@ class Renderer {
   virtual VkSemaphore uploadSemaphore() const = 0;
 
   // Builds every pipeline that record() will ask for with frames of this volume, uploaded with these options and drawn
-  // alone, as they are, with the filters of `quality` in this colour format. Reads no page; call it while loading, for it may take seconds.
+  // alone, as they are, with the filters of `quality` in this colour format. Reads no page; call it while loading, for
+  // it may take seconds.
   virtual Result<void> prepare(const format::Pack& pack, std::uint32_t volume, const UploadOptions& options,
                                const Quality& quality, ColorFormat colorFormat) = 0;
 
   // Records one dispatch that writes every pixel of both images. Where a combination of grids, index, filters, colour
-  // format, number of layers and whether they are carried was not prepared, its pipeline is built here when it is first met.
-  // barriers: both images must be in VK_IMAGE_LAYOUT_GENERAL and free of pending access; afterwards they were written
-  // by the compute shader stage. The submission must wait for the uploadValue() of each frame.
+  // format, number of layers and whether they are carried was not prepared, its pipeline is built here when it is first
+  // met. barriers: both images must be in VK_IMAGE_LAYOUT_GENERAL and free of pending access; afterwards they were
+  // written by the compute shader stage. The submission must wait for the uploadValue() of each frame.
   virtual Result<void> record(VkCommandBuffer commands, const DrawInfo& draw) = 0;
 
   // barriers: as record(), for the two buffers.

@@ -182,7 +182,7 @@ struct StreamStats {
 struct StreamError {
   ErrorCode code = ErrorCode::pack;
   AssetId asset = {};
-  std::uint32_t volume = 0, frame = 0;
+  std::uint32_t volume = format::kNone, frame = format::kNone;  // kNone: it is about no single one
   std::optional<std::uint32_t> page = {};
   std::string message = {};  // one line: what, where, why, and what still plays
 };
