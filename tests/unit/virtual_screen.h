@@ -25,7 +25,7 @@ bool eventually(const Condition& holds, std::chrono::seconds most = std::chrono:
   const auto end = std::chrono::steady_clock::now() + most;
   while (!holds()) {
     if (std::chrono::steady_clock::now() > end) return false;
-    std::this_thread::sleep_for(std::chrono::milliseconds(30));
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
   return true;
 }
