@@ -181,8 +181,8 @@ TEST_F(ViewerWindow, PlaysPausesStepsAndTakesPictures) {
   Shot held, later, stepped;
   ASSERT_NO_FATAL_FAILURE(shoot(held));
   EXPECT_GT(burning(held), 400u);
-  ASSERT_NO_FATAL_FAILURE(shoot(later));  // the first is not written over
-  EXPECT_EQ(later, held);
+  ASSERT_NO_FATAL_FAILURE(shoot(later));          // the first is not written over
+  EXPECT_LE(difference(later, held).largest, 1);  // blocks lie where they happen to
   EXPECT_EQ(frame(), number);
 
   screen_.hand("key Right");
