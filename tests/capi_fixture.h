@@ -107,6 +107,27 @@ class CapiTest : public GpuTest {
   }
 };
 
+inline std::vector<std::byte> smokePack(std::uint32_t frames = 4) {
+  return sequencePack(frames, [](std::uint32_t) { return 20u; });
+}
+
+// With a pack of smoke.
+class CapiPlay : public CapiTest {
+ protected:
+  // Stands at its first frame.
+  static Instance standing(Context& context, const Pack& pack) {
+    Playback still;
+    still.speed = 0;
+    still.interpolation = BILLOW_INTERPOLATION_HOLD;
+    InstanceInfo info;
+    info.pack = pack.id();
+    info.playback = &still;
+    return valueOf(context.addInstance(info), "instance");
+  }
+
+  PackFile file_{smokePack()};
+};
+
 inline double sum(const std::vector<float>& values) {
   double total = 0;
   for (const float value : values) total += double{value};

@@ -13,26 +13,32 @@
  *   BillowOpenInfo file = BILLOW_OPEN_INFO_DEFAULT;
  *   file.path = "fire.blw";
  *   BillowPack pack;
- *   billowOpen(billow, &file, &pack, &error);            // open
+ *   if (billowOpen(billow, &file, &pack, &error) != BILLOW_OK) puts(error.message);  // open
  *   BillowInstanceInfo fire = BILLOW_INSTANCE_INFO_DEFAULT;
  *   fire.pack = pack;
  *   BillowInstance instance;
- *   billowAddInstance(billow, &fire, &instance, &error);
+ *   if (billowAddInstance(billow, &fire, &instance, &error) != BILLOW_OK) puts(error.message);
  *   BillowSpaceInfo spaceInfo = BILLOW_SPACE_INFO_DEFAULT;
  *   BillowSpace* space = NULL;
- *   billowCreateSpace(billow, &spaceInfo, &space, &error);
+ *   if (billowCreateSpace(billow, &spaceInfo, &space, &error) != BILLOW_OK) puts(error.message);
  *
  *   // each frame of the game
  *   BillowUpdateInfo moment = BILLOW_UPDATE_INFO_DEFAULT;
  *   moment.seconds = secondsSinceTheFrameBefore;
  *   moment.view = &view;
- *   billowUpdate(billow, &moment, &error);               // update
+ *   if (billowUpdate(billow, &moment, &error) != BILLOW_OK) puts(error.message);     // update
+ *   while (billowTakeError(billow, &error) == BILLOW_OK) puts(error.message);
  *   BillowDrawInfo draw = BILLOW_DRAW_INFO_DEFAULT;
  *   draw.space = space;
  *   draw.view = &view;
- *   draw.width = 1920, draw.height = 1080, draw.color = colorView, draw.depth = depthView;
- *   billowDraw(billow, commands, &draw, &error);         // draw
- *   // submit `commands` with a wait for billowUpdateWait()
+ *   draw.width = 1920, draw.height = 1080;               // of two images with VK_IMAGE_USAGE_STORAGE_BIT,
+ *   draw.color = colorView, draw.depth = depthView;      // now in VK_IMAGE_LAYOUT_GENERAL
+ *   if (billowDraw(billow, commands, &draw, &error) != BILLOW_OK) puts(error.message);  // draw
+ *   BillowWait uploads = BILLOW_WAIT_DEFAULT;
+ *   billowUpdateWait(billow, &uploads);
+ *   VkSemaphoreSubmitInfo wait = {VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO, NULL, uploads.semaphore, uploads.value,
+ *                                 VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT, 0};
+ *   submit.waitSemaphoreInfoCount = 1, submit.pWaitSemaphoreInfos = &wait;              // of vkQueueSubmit2()
  *
  * The host owns instance, device, queues, images, command buffers and the frame loop. billow enables nothing and waits
  * for nothing. It submits uploads alone, to the queue that the host lends. No Vulkan symbol is linked: all functions
@@ -58,7 +64,9 @@
  *
  * Memory. Vulkan's memory is never above BillowConfig::gpuBudget for frames, memoryBudget of each space, stagingBytes for
  * uploads, and less than 1 MiB for tables of draws. The system's for loads, staging and tables of packs is never above
- * cpuBudget.
+ * cpuBudget; looks are fitted beside it (BillowOpenInfo::noLooks).
+ *
+ * Limits. A draw in a space shows up to 8 instances, as BillowSpaceInfo::maxVolumes says; any number may play.
  *
  * Units. Lengths are world units, times seconds, angles degrees, colours and radiances linear RGB, temperatures kelvin.
  * Transforms are row-major 3x4. For 64-bit machines. */
@@ -103,9 +111,10 @@ typedef enum BillowResult {
   BILLOW_ERROR_PACK = -1,        /* a pack breaks a rule of its format or cannot be read */
   BILLOW_ERROR_BUDGET = -2,      /* it does not fit into the budget; nothing was allocated */
   BILLOW_ERROR_UNSUPPORTED = -3, /* the device lacks something that billow needs */
-  BILLOW_ERROR_VULKAN = -4,      /* a Vulkan call failed; after VK_ERROR_DEVICE_LOST see billowDetach() */
+  BILLOW_ERROR_VULKAN = -4,      /* a Vulkan call failed */
   BILLOW_ERROR_ARGUMENT = -5,    /* an argument is outside of what its comment allows */
   BILLOW_ERROR_MEMORY = -6,      /* the system's memory, not the GPU's, or another of its resources ran out */
+  BILLOW_ERROR_DEVICE_LOST = -7, /* a Vulkan call failed with VK_ERROR_DEVICE_LOST; see billowDetach() */
   BILLOW_RESULT_MAX_ENUM = 0x7fffffff
 } BillowResult;
 
@@ -231,10 +240,12 @@ typedef struct BillowConfig {
   uint64_t gpuBudget;    /* bytes of device memory of resident frames; never exceeded */
   uint64_t cpuBudget;    /* bytes for staging, reads in flight, scratch, tables of open packs; never exceeded */
   uint64_t stagingBytes; /* of the upload ring, a part of cpuBudget, at least 64 KiB */
-  uint32_t threads;      /* of billow's that decompress; 0: `jobs` does all of it. billowOpenLater() takes one more, while a
-                          * look is fitted. */
-  uint32_t readThreads;  /* of billow's that read files; 0: packs come from a BillowFile alone */
-  double prefetchSeconds; /* how far ahead of what is shown is loaded, real time, >= 0 */
+  /* Billow's threads: these, of which 0 may be, and then `jobs` does all of it; readThreads; one that plans, which sleeps
+   * but for some tens of microseconds an update; with BILLOW_SUBMIT_OWN one that submits; one that fits looks, from the
+   * first billowOpenLater() or billowReload() that wants them. */
+  uint32_t threads;      /* that decompress */
+  uint32_t readThreads;  /* that read files; 0: packs come from a BillowFile alone */
+  double prefetchSeconds; /* how far ahead of what is shown is loaded, real time, 0 to 60 */
   BillowVerify verify;
   BillowSubmission submission;
   BillowBlocks blocks;
@@ -265,12 +276,14 @@ BILLOW_API BillowResult billowCreate(const BillowDevice* device, const BillowCon
 BILLOW_API void billowDestroy(BillowContext* context);
 
 /* Changes the budgets, both in bytes. Smaller ones take effect as soon as the frames in flight allow; what is drawn
- * becomes coarser where it must. */
-BILLOW_API void billowSetBudget(BillowContext* context, uint64_t gpuBytes, uint64_t cpuBytes);
+ * becomes coarser where it must. BILLOW_ERROR_ARGUMENT: gpuBytes is 0, or cpuBytes less than stagingBytes. */
+BILLOW_API BillowResult billowSetBudget(BillowContext* context, uint64_t gpuBytes, uint64_t cpuBytes,
+                                        BillowError* error);
 
-/* After the device was lost, or before the host replaces it: gives back everything on it, waits for billow's threads,
- * and forgets what was resident. Packs, instances and spaces stay. Until billowAttach() updates advance time alone, and
- * draws are BILLOW_NOT_READY. No commands that draw may be pending, unless the device is lost. */
+/* After the device was lost, or before the host replaces it: gives back everything on it, and forgets what was
+ * resident. Packs, instances and spaces stay. It waits for packs that open, loads and uploads that are under way, and so
+ * for the host's reads of them. Until billowAttach() updates advance time alone and nothing is drawable: billowDraw(),
+ * billowCreateSpace() and the like are BILLOW_NOT_READY. No commands that draw may be pending, unless the device is lost. */
 BILLOW_API void billowDetach(BillowContext* context);
 
 /* Goes on with another device, which may lack and have other things. Errors as billowCreate(); the context is then still
@@ -297,7 +310,10 @@ typedef struct BillowFile {
   /* Begins to fill `into` with `count` bytes at `offset`, which lie within the pack, and returns without waiting.
    * `into` stays until billowReadDone(). Called by several threads at once. Bytes are not trusted. */
   void (*read)(void* user, uint64_t offset, void* into, size_t count, BillowRead done);
-  void (*close)(void* user); /* optional: no further read() comes, all reads have ended; from any thread */
+  /* Optional: no further read() comes, all reads have ended. Once, from any thread, if billowOpen(), billowOpenLater() or
+   * billowReload() was BILLOW_OK: when the pack was closed, replaced or could not be opened after all, at the latest in
+   * billowDestroy(). Where they fail the file stays the host's, nothing reads it any more, and close() does not come. */
+  void (*close)(void* user);
   void* user;
 } BillowFile;
 #define BILLOW_FILE_DEFAULT {sizeof(BillowFile), 0, 0, NULL, NULL, NULL}
@@ -306,7 +322,8 @@ typedef struct BillowFile {
 typedef struct BillowOpenInfo {
   uint32_t size;
   /* 1: no look is fitted: instances have the host's, or what the pack says beside BILLOW_LOOK_DEFAULT. Fitting takes
-   * memory of one frame and of the pack's tables beside cpuBudget, while the pack opens. */
+   * memory of one frame and of the pack's tables beside cpuBudget and BillowAllocator: billowOpen() on the calling thread,
+   * billowOpenLater() and billowReload() one pack after the other on one thread, which the first of them starts. */
   uint32_t noLooks;
   const char* path; /* in the system's encoding; the file stays open and must not be written to, only replaced */
   const BillowFile* file; /* copied */
@@ -321,7 +338,8 @@ BILLOW_API BillowResult billowOpen(BillowContext* context, const BillowOpenInfo*
                                    BillowError* error);
 
 /* The same on billow's threads: returns at once, and billowPackState() tells. A failure comes through
- * billowTakeError(). Instances may be added before it is ready; they are drawn from then on. */
+ * billowTakeError(). Instances may be added before it is ready; they are drawn from then on: plainly, as with
+ * BillowOpenInfo::noLooks, until their look is fitted. */
 BILLOW_API BillowResult billowOpenLater(BillowContext* context, const BillowOpenInfo* info, BillowPack* pack,
                                         BillowError* error);
 
@@ -329,7 +347,7 @@ typedef enum BillowPackState {
   BILLOW_PACK_UNKNOWN = 0, /* closed, or never was */
   BILLOW_PACK_OPENING = 1,
   BILLOW_PACK_READY = 2,
-  BILLOW_PACK_FAILED = 3, /* to be closed, or reloaded */
+  BILLOW_PACK_FAILED = 3, /* could not be opened; to be closed */
   BILLOW_PACK_STATE_MAX_ENUM = 0x7fffffff
 } BillowPackState;
 
@@ -414,7 +432,7 @@ typedef struct BillowLook {
   }
 
 /* The look that fits a volume: what its pack says, and for the rest values measured from its data. Instances without a
- * look of their own are drawn so. BILLOW_NOT_READY while the pack opens. */
+ * look of their own are drawn so. BILLOW_NOT_READY while the pack opens and the look is measured. */
 BILLOW_API BillowResult billowSuggestLook(const BillowContext* context, BillowPack pack, uint32_t volume,
                                           BillowLook* look, BillowError* error);
 
@@ -574,7 +592,8 @@ typedef struct BillowStats {
 BILLOW_API void billowStats(const BillowContext* context, BillowStats* stats);
 
 /* Takes the oldest error of billow's threads: a broken page, a failed read, a pack that could not be opened. Each comes
- * once; all else keeps playing. BILLOW_NOT_READY: there is none. */
+ * once; all else keeps playing. BILLOW_OK: one was taken, error->code and the rest tell of it. BILLOW_NOT_READY: there is
+ * none. While 256 wait to be taken further ones are logged alone. */
 BILLOW_API BillowResult billowTakeError(BillowContext* context, BillowError* error);
 
 /* ---- draw */
@@ -721,7 +740,9 @@ typedef struct BillowDrawInfo {
   const BillowSun* sun;               /* optional, as all that follow: their defaults */
   const BillowQuality* quality;
   const BillowBackground* background;
-  const BillowInstance* instances; /* NULL: all of the context. Those that are not drawable yet are left out. */
+  /* NULL: all of the context; where more than BillowSpaceInfo::maxVolumes are drawable, those that are largest in the
+   * picture, times their priority. Those that are not drawable yet are left out. */
+  const BillowInstance* instances;
   uint32_t instanceCount;
   uint32_t width, height; /* of all images; the first two are in VK_IMAGE_LAYOUT_GENERAL */
   uint32_t reserved;
@@ -739,7 +760,7 @@ typedef struct BillowDrawInfo {
   double anchor[3]; /* voxels' centres lie at whole multiples of voxelSize from it, so that a moving space doesn't swim */
   BillowAttenuation attenuation;
   BillowBlend blend;
-  BillowRefill refill;     /* always, where BillowSpaceInfo::keepFilled is 0 */
+  BillowRefill refill;     /* which metavoxels are filled anew; all, where BillowSpaceInfo::keepFilled is 0 */
   uint32_t noCull;         /* 1: what neither the eye sees nor light passes on its way to it is drawn too */
   float lightExtinction[3]; /* what red, green and blue sunlight lose, as multiples of the extinction, >= 0 */
   uint32_t firstTimestamp;
@@ -758,7 +779,7 @@ typedef struct BillowDrawInfo {
  * not met before are built here, unless billowPrepare() has. Draws of one space follow each other on one queue.
  * barriers: both images free of pending access before; afterwards they were read and written by the compute shader stage.
  * BILLOW_NOT_READY: nothing was recorded, the images are as they were: detached, or without a space and the instance is
- * not drawable yet. BILLOW_ERROR_ARGUMENT: more instances than maxVolumes, an effect of another pack, numbers out of
+ * not drawable yet. BILLOW_ERROR_ARGUMENT: more given instances than maxVolumes, an effect of another pack, numbers out of
  * range. */
 BILLOW_API BillowResult billowDraw(BillowContext* context, VkCommandBuffer commands, const BillowDrawInfo* draw,
                                    BillowError* error);

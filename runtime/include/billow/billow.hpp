@@ -4,11 +4,16 @@
 //   auto context = billow::Context::create(device, config);
 //   if (!context) return fail(context.error().message);
 //   auto pack = context->open("fire.blw");
+//   if (!pack) return fail(pack.error().message);
 //   auto fire = context->addInstance(pack->id());
+//   if (!fire) return fail(fire.error().message);
 //   auto space = context->createSpace({});
+//   if (!space) return fail(space.error().message);
 //   ...
-//   context->update(moment);
-//   context->draw(commands, draw);
+//   if (auto done = context->update(moment); !done) warn(done.error().message);
+//   while (auto error = context->takeError()) warn(error->message);
+//   if (auto done = context->draw(commands, draw); !done) warn(done.error().message);
+//   // `commands` are submitted with a wait for context->wait()
 //
 // Handles are moved, not copied. What a Context made must be gone before it. Nothing here throws.
 #ifndef BILLOW_BILLOW_HPP
@@ -253,7 +258,9 @@ class Context : public Owned<BillowContext*, BillowContext*, detail::destroyCont
     if (billowCreate(&device, &config, &context, &error) == BILLOW_OK) return Context(context);
     return error;
   }
-  void setBudget(std::uint64_t gpuBytes, std::uint64_t cpuBytes) { billowSetBudget(get(), gpuBytes, cpuBytes); }
+  Expected<void> setBudget(std::uint64_t gpuBytes, std::uint64_t cpuBytes) {
+    return done([&](BillowError* e) { return billowSetBudget(get(), gpuBytes, cpuBytes, e); });
+  }
   void detach() { billowDetach(get()); }
   Expected<void> attach(const Device& device) {
     return done([&](BillowError* e) { return billowAttach(get(), &device, e); });
@@ -312,7 +319,7 @@ class Context : public Owned<BillowContext*, BillowContext*, detail::destroyCont
   // The oldest error of billow's threads, each once.
   std::optional<Error> takeError() {
     Error error;
-    if (billowTakeError(get(), &error) == BILLOW_NOT_READY) return std::nullopt;
+    if (billowTakeError(get(), &error) != BILLOW_OK) return std::nullopt;
     return error;
   }
   // The given instances and effects in place of those of `info`, where there are some.

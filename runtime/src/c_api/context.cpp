@@ -1,6 +1,5 @@
 #include "c_api/context.h"
 
-#include <cmath>
 #include <limits>
 
 #include "c_api/convert.h"
@@ -43,7 +42,7 @@ Outcome<runtime::StreamConfig> streamConfigOf(const BillowConfig& c, BillowConte
   if (c.framesInFlight == 0) return badArgument("BillowConfig::framesInFlight is 0");
   if (c.directDraws == 0) return badArgument("BillowConfig::directDraws is 0");
   if (c.stagingBytes < 65536) return badArgument("BillowConfig::stagingBytes is less than 64 KiB");
-  if (!(c.prefetchSeconds >= 0) || !std::isfinite(c.prefetchSeconds)) {
+  if (!(c.prefetchSeconds >= 0 && c.prefetchSeconds <= 60)) {
     return badArgument("BillowConfig::prefetchSeconds is outside of its range");
   }
   const auto verify = enumerator<runtime::Verify>(c.verify, 3, "BillowConfig::verify");
@@ -89,7 +88,18 @@ Outcome<void> create(const BillowDevice* device, const BillowConfig* config, Bil
   auto streamer = runtime::Streamer::create(*context->renderer, *stream);
   if (!streamer) return problem(streamer.error());
   context->streamer = std::move(*streamer);
+  context->stagingBytes = c->stagingBytes;
   *into = context.release();
+  return {};
+}
+
+Outcome<void> setBudget(BillowContext& context, std::uint64_t gpuBytes, std::uint64_t cpuBytes) {
+  if (gpuBytes == 0) return badArgument("gpuBytes is 0");
+  if (cpuBytes < context.stagingBytes) {
+    return badArgument("cpuBytes of " + std::to_string(cpuBytes) + " do not hold BillowConfig::stagingBytes of " +
+                       std::to_string(context.stagingBytes));
+  }
+  context.streamer->setBudget(gpuBytes, cpuBytes);
   return {};
 }
 
@@ -127,10 +137,8 @@ Outcome<void> attach(BillowContext& context, const BillowDevice* device) {
 }  // namespace
 }  // namespace billow::c_api
 
-// What reads packs goes before what they are of, and all that is on the device before the renderer.
+// All that is on the device goes before the renderer.
 BillowContext::~BillowContext() {
-  for (auto& [id, pack] : packs) pack.fit.reset();
-  abandoned.clear();
   streamer.reset();
   renderer.reset();
 }
@@ -146,13 +154,13 @@ void billowDestroy(BillowContext* context) {
   delete context;
 }
 
-void billowSetBudget(BillowContext* context, uint64_t gpuBytes, uint64_t cpuBytes) {
-  context->streamer->setBudget(gpuBytes, cpuBytes);
+BillowResult billowSetBudget(BillowContext* context, uint64_t gpuBytes, uint64_t cpuBytes, BillowError* error) {
+  return billow::c_api::answering(error, [&] { return billow::c_api::setBudget(*context, gpuBytes, cpuBytes); });
 }
 
 void billowDetach(BillowContext* context) {
   if (context->renderer == nullptr) return;
-  context->streamer->detach();
+  billow::c_api::quietly([&] { context->streamer->detach(); });
   billow::c_api::forgetDevice(*context);
 }
 

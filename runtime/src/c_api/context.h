@@ -21,7 +21,7 @@ struct OpenedPack {
   bool fitLooks = true;
   const format::Pack* facted = nullptr;  // of which `volumes` tells; null before
   std::vector<VolumeFacts> volumes;      // those that can be played
-  std::unique_ptr<LookFit> fit;          // of the pack as it is, or will be after a reload; null: there is none
+  std::shared_ptr<LookFit> fit;          // of the pack as it is, or will be after a reload; null: there is none
   bool awaitsLooks = false;              // `fit` is of the pack as it is
   bool ready = false;                    // has been ready to be drawn
 };
@@ -38,13 +38,14 @@ struct PlacedInstance {
 
 struct BillowContext {
   billow::runtime::Config rendererConfig;
+  std::uint64_t stagingBytes = 0;
   std::unique_ptr<billow::runtime::Renderer> renderer;  // null while detached
   std::unique_ptr<billow::runtime::Streamer> streamer;
   std::map<std::uint32_t, billow::c_api::OpenedPack> packs;          // by BillowPack::id, which is the AssetId
   std::map<std::uint32_t, billow::c_api::PlacedInstance> instances;  // by BillowInstance::id
   std::uint32_t lastInstance = 0;
-  std::vector<std::unique_ptr<billow::c_api::LookFit>> abandoned;  // of closed packs, until they end
-  std::vector<billow::c_api::Problem> late;                        // for billowTakeError(), the oldest first
+  billow::c_api::LookFitter fitter;
+  std::vector<billow::c_api::Problem> late;  // for billowTakeError(), the oldest first
   BillowLog log = BILLOW_LOG_DEFAULT;
   std::vector<BillowSpace*> spaces;
   std::vector<BillowCompositor*> compositors;

@@ -57,7 +57,8 @@ Outcome<void> effectInfo(const BillowContext& context, BillowPack pack, std::uin
 Outcome<void> suggestLook(const BillowContext& context, BillowPack pack, std::uint32_t volume, BillowLook* into) {
   const auto facts = volumeOf(context, pack, volume);
   if (!facts) return tl::unexpected(facts.error());
-  return answer(lookOf(*(*facts)->look), into);
+  if (context.packs.at(pack.id).awaitsLooks) return notReady("the look is still measured");
+  return answer(lookOf((*facts)->look), into);
 }
 
 }  // namespace

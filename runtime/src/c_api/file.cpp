@@ -13,8 +13,10 @@ class HostFile final : public runtime::AsyncSource {
   HostFile(const HostFile&) = delete;
   HostFile& operator=(const HostFile&) = delete;
   ~HostFile() override {
-    if (file_.close != nullptr) file_.close(file_.user);
+    if (taken_ && file_.close != nullptr) file_.close(file_.user);
   }
+
+  void take() { taken_ = true; }
 
   std::uint64_t size() const override { return file_.bytes; }
   void read(std::uint64_t offset, std::span<std::byte> into, runtime::ReadDone done) override {
@@ -24,6 +26,7 @@ class HostFile final : public runtime::AsyncSource {
 
  private:
   BillowFile file_;
+  bool taken_ = false;
 };
 
 }  // namespace
@@ -39,8 +42,12 @@ Outcome<runtime::PackSource> sourceOf(const BillowOpenInfo& info) {
   });
 }
 
+void takeFile(const runtime::PackSource& source) {
+  if (source.source != nullptr) static_cast<HostFile&>(*source.source).take();
+}
+
 }  // namespace billow::c_api
 
 extern "C" void billowReadDone(BillowRead read, uint32_t success) {
-  reinterpret_cast<billow::c_api::End>(read.call)(read.context, success != 0);
+  billow::c_api::quietly([&] { reinterpret_cast<billow::c_api::End>(read.call)(read.context, success != 0); });
 }

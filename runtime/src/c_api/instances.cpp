@@ -122,10 +122,12 @@ BillowResult billowAddInstance(BillowContext* context, const BillowInstanceInfo*
 }
 
 void billowRemoveInstance(BillowContext* context, BillowInstance instance) {
-  const auto found = context->instances.find(instance.id);
-  if (found == context->instances.end()) return;
-  if (found->second.stream.value != 0) context->streamer->removeInstance(found->second.stream);
-  context->instances.erase(found);
+  quietly([&] {
+    const auto found = context->instances.find(instance.id);
+    if (found == context->instances.end()) return;
+    if (found->second.stream.value != 0) context->streamer->removeInstance(found->second.stream);
+    context->instances.erase(found);
+  });
 }
 
 BillowResult billowSetPlayback(BillowContext* context, BillowInstance instance, const BillowPlayback* playback,

@@ -4,6 +4,7 @@
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <system_error>
 
 namespace billow::c_api {
 namespace {
@@ -52,17 +53,10 @@ std::optional<runtime::Look> fitLook(const format::Pack& pack, const format::Vol
 
 }  // namespace
 
-LookFit::LookFit(runtime::PackSource source) : source_(std::move(source)), thread_([this] { run(); }) {}
-
-LookFit::~LookFit() {
-  stop_ = true;
-  thread_.join();
-}
-
 void LookFit::run() noexcept {
   try {
     // A pack that cannot be opened is an error of the streamer's, which opens it as well.
-    if (const auto pack = openAgain(source_)) {
+    if (const auto pack = openAgain(source_); pack && !stop_) {
       looks_.resize(pack->volumes().size());
       for (std::uint32_t number = 0; number < looks_.size() && !stop_; ++number) {
         if (!pack->isLevel(number)) looks_[number] = fitLook(*pack, pack->volumes()[number]);
@@ -73,7 +67,43 @@ void LookFit::run() noexcept {
   }
   source_ = {};
   done_ = true;
-  done_.notify_all();
+}
+
+LookFitter::~LookFitter() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+    if (running_ != nullptr) running_->abandon();
+  }
+  more_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void LookFitter::add(std::shared_ptr<LookFit> fit) {
+  const std::lock_guard lock(mutex_);
+  waiting_.push_back(std::move(fit));
+  more_.notify_all();
+  if (thread_.joinable()) return;
+  try {
+    thread_ = std::thread([this] { run(); });
+  } catch (const std::system_error&) {
+    waiting_.pop_back();
+    throw;
+  }
+}
+
+void LookFitter::run() noexcept {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    more_.wait(lock, [&] { return stop_ || !waiting_.empty(); });
+    if (stop_) return;
+    running_ = std::move(waiting_.front());
+    waiting_.pop_front();
+    lock.unlock();
+    running_->run();
+    lock.lock();
+    running_.reset();
+  }
 }
 
 }  // namespace billow::c_api

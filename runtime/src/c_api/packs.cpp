@@ -18,23 +18,24 @@ Outcome<OpenedPack*> known(BillowContext& context, BillowPack pack) {
 }
 
 // A fit that is under way ends by itself, and nobody waits for it here.
-void abandon(BillowContext& context, OpenedPack& pack) {
-  if (pack.fit != nullptr) context.abandoned.push_back(std::move(pack.fit));
+void abandon(OpenedPack& pack) {
+  if (pack.fit != nullptr) pack.fit->abandon();
+  pack.fit.reset();
   pack.awaitsLooks = false;
 }
 
+// What could not be measured is drawn plainly.
 void setLooks(const Looks& looks, OpenedPack& pack) {
   for (VolumeFacts& volume : pack.volumes) {
-    if (volume.number < looks.size() && looks[volume.number]) volume.look = looks[volume.number];
+    if (volume.number < looks.size() && looks[volume.number]) volume.look = *looks[volume.number];
   }
 }
 
 // Facts of the pack as it is now. Until new looks are fitted the old ones stay.
 void takeFacts(const format::Pack& now, OpenedPack& pack) {
   std::vector<VolumeFacts> facts = volumeFacts(now);
-  for (std::size_t i = 0; i < facts.size(); ++i) {
+  for (std::size_t i = 0; i < facts.size() && pack.fitLooks; ++i) {
     if (i < pack.volumes.size()) facts[i].look = pack.volumes[i].look;
-    if (!pack.fitLooks) facts[i].look = plainLook(now.volumes()[facts[i].number]);
   }
   pack.volumes = std::move(facts);
   pack.facted = &now;
@@ -42,14 +43,14 @@ void takeFacts(const format::Pack& now, OpenedPack& pack) {
 }
 
 void becomeReady(BillowContext& context, std::uint32_t id, OpenedPack& pack) {
-  // What could not be measured is drawn plainly.
-  for (VolumeFacts& volume : pack.volumes) {
-    if (!volume.look) volume.look = plainLook(pack.facted->volumes()[volume.number]);
-  }
   pack.ready = true;
   for (auto& [number, instance] : context.instances) {
     if (instance.pack != id || instance.stream.value != 0) continue;
-    if (auto started = startInstance(context, instance); !started) context.late.push_back(started.error());
+    if (auto started = startInstance(context, instance); !started) {
+      Problem& problem = context.late.emplace_back(std::move(started.error()));
+      problem.pack = id;
+      problem.volume = instance.volume;
+    }
   }
 }
 
@@ -69,12 +70,20 @@ Outcome<void> open(BillowContext& context, const BillowOpenInfo* info, BillowPac
   if (!taken) return tl::unexpected(taken.error());
   OpenedPack pack;
   pack.fitLooks = taken->noLooks == 0;
+  if (pack.fitLooks) pack.fit = std::make_shared<LookFit>(source);
   const auto asset = later ? context.streamer->openLater(source) : context.streamer->open(source);
   if (!asset) return problem(asset.error());
-  if (pack.fitLooks) pack.fit = std::make_unique<LookFit>(source);
-  if (pack.fitLooks && !later) pack.fit->wait();
-  context.packs.emplace(asset->value, std::move(pack));
-  takeIn(context, asset->value);
+  try {
+    const auto fit = context.packs.emplace(asset->value, std::move(pack)).first->second.fit;
+    if (fit != nullptr && later) context.fitter.add(fit);
+    if (fit != nullptr && !later) fit->run();
+    takeIn(context, asset->value);
+  } catch (...) {
+    context.packs.erase(asset->value);
+    context.streamer->close(*asset);
+    throw;
+  }
+  takeFile(source);
   into->id = asset->value;
   return {};
 }
@@ -85,21 +94,23 @@ Outcome<void> reload(BillowContext& context, BillowPack pack, const BillowOpenIn
   runtime::PackSource source;
   const auto taken = openInfo(info, source);
   if (!taken) return tl::unexpected(taken.error());
-  auto fit = taken->noLooks == 0 ? std::make_unique<LookFit>(source) : nullptr;
-  if (auto done = context.streamer->reload(assetOf(pack.id), source); !done) {
-    if (fit != nullptr) context.abandoned.push_back(std::move(fit));
-    return problem(done.error());
-  }
-  abandon(context, **entry);
+  auto fit = taken->noLooks == 0 ? std::make_shared<LookFit>(source) : nullptr;
+  if (auto done = context.streamer->reload(assetOf(pack.id), source); !done) return problem(done.error());
+  takeFile(source);
+  abandon(**entry);
   (*entry)->fitLooks = taken->noLooks == 0;
-  (*entry)->fit = std::move(fit);
+  // Without a thread the old looks stay: the reload is under way.
+  quietly([&] {
+    if (fit != nullptr) context.fitter.add(fit);
+    (*entry)->fit = std::move(fit);
+  });
   return {};
 }
 
 void close(BillowContext& context, BillowPack pack) {
   const auto found = context.packs.find(pack.id);
   if (found == context.packs.end()) return;
-  abandon(context, found->second);
+  abandon(found->second);
   context.packs.erase(found);
   std::erase_if(context.instances, [&](const auto& entry) { return entry.second.pack == pack.id; });
   context.streamer->close(assetOf(pack.id));
@@ -119,12 +130,11 @@ void takeIn(BillowContext& context, std::uint32_t id) {
     pack.fit.reset();
     pack.awaitsLooks = false;
   }
-  if (!pack.awaitsLooks && !pack.ready) becomeReady(context, id, pack);
+  if (!pack.ready) becomeReady(context, id, pack);
 }
 
 void takeIn(BillowContext& context) {
   for (const auto& [id, pack] : context.packs) takeIn(context, id);
-  std::erase_if(context.abandoned, [](const auto& fit) { return fit->looks() != nullptr; });
 }
 
 Outcome<const format::Pack*> packOf(const BillowContext& context, BillowPack pack) {
@@ -165,11 +175,7 @@ BillowResult billowOpenLater(BillowContext* context, const BillowOpenInfo* info,
 BillowPackState billowPackState(BillowContext* context, BillowPack pack) {
   const auto found = context->packs.find(pack.id);
   if (found == context->packs.end()) return BILLOW_PACK_UNKNOWN;
-  const auto take = [&]() -> Outcome<void> {
-    takeIn(*context, pack.id);
-    return {};
-  };
-  answering(nullptr, take);
+  quietly([&] { takeIn(*context, pack.id); });
   if (found->second.ready) return BILLOW_PACK_READY;
   const bool failed = context->streamer->state(assetOf(pack.id)) == runtime::Streamer::AssetState::failed;
   return failed ? BILLOW_PACK_FAILED : BILLOW_PACK_OPENING;
@@ -180,11 +186,7 @@ BillowResult billowReload(BillowContext* context, BillowPack pack, const BillowO
 }
 
 void billowClose(BillowContext* context, BillowPack pack) {
-  const auto work = [&]() -> Outcome<void> {
-    close(*context, pack);
-    return {};
-  };
-  answering(nullptr, work);
+  quietly([&] { close(*context, pack); });
 }
 
 }  // extern "C"

@@ -29,6 +29,8 @@ BillowResult resultOf(runtime::ErrorCode code) {
       return BILLOW_ERROR_UNSUPPORTED;
     case runtime::ErrorCode::vulkan:
       return BILLOW_ERROR_VULKAN;
+    case runtime::ErrorCode::deviceLost:
+      return BILLOW_ERROR_DEVICE_LOST;
     case runtime::ErrorCode::argument:
       return BILLOW_ERROR_ARGUMENT;
     case runtime::ErrorCode::memory:
@@ -88,6 +90,7 @@ const char* billowResultName(BillowResult result) {
     BILLOW_NAME(BILLOW_ERROR_VULKAN)
     BILLOW_NAME(BILLOW_ERROR_ARGUMENT)
     BILLOW_NAME(BILLOW_ERROR_MEMORY)
+    BILLOW_NAME(BILLOW_ERROR_DEVICE_LOST)
 #undef BILLOW_NAME
     default:
       return "BILLOW_RESULT_UNKNOWN";

@@ -2,7 +2,6 @@
 #ifndef BILLOW_RUNTIME_C_API_PROBLEM_H
 #define BILLOW_RUNTIME_C_API_PROBLEM_H
 
-#include <exception>
 #include <string>
 #include <tl/expected.hpp>
 #include <utility>
@@ -35,9 +34,18 @@ BillowResult answering(BillowError* error, const Work& work) noexcept {
   try {
     const Outcome<void> done = work();
     return done ? BILLOW_OK : report(done.error(), error);
-  } catch (const std::exception&) {
+  } catch (...) {
     return report({.result = BILLOW_ERROR_MEMORY}, error);
   }
+}
+
+// The same for those that have no result.
+template <class Work>
+void quietly(const Work& work) noexcept {
+  answering(nullptr, [&]() -> Outcome<void> {
+    work();
+    return {};
+  });
 }
 
 }  // namespace billow::c_api

@@ -11,7 +11,7 @@ void addShown(const BillowContext& context, const PlacedInstance& instance, std:
   if (shown.drawable.count == 0 || !facts) return;
   shown.instance = &instance;
   shown.facts = *facts;
-  shown.look = instance.look ? *instance.look : *(*facts)->look;
+  shown.look = instance.look ? *instance.look : (*facts)->look;
   all.push_back(shown);
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "billow/format/similarity.h"
 #include "c_api/convert.h"
@@ -54,6 +55,32 @@ Place placeAround(const BillowSpace& space, const std::vector<Shown>& shown,
   const double voxel = std::max(finest, least);
   if (voxel > 0) place.voxelSize = static_cast<float>(voxel);
   return place;
+}
+
+// The instance's size in the picture, times its priority: what billow loads by.
+double importanceOf(const Shown& one, const std::array<double, 3>& eye) {
+  const runtime::WorldBox box = transformed(one.facts->box, one.instance->info.objectToWorld);
+  double size = 0, distance = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    size += (box.max[i] - box.min[i]) * (box.max[i] - box.min[i]);
+    const double way = std::max({box.min[i] - eye[i], eye[i] - box.max[i], 0.0});
+    distance += way * way;
+  }
+  // From within it is as large as the picture, whatever its size.
+  return double{one.instance->info.priority} * (size > 0 ? std::sqrt(size / std::max(distance, size * 1e-6)) : 0);
+}
+
+// The most important ones, where there are more than `most`; they stay in their order.
+void keepLargest(const std::array<double, 3>& eye, std::uint32_t most, std::vector<Shown>& shown) {
+  if (shown.size() <= most) return;
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t i = 0; i < shown.size(); ++i) order.emplace_back(-importanceOf(shown[i], eye), i);
+  std::sort(order.begin(), order.end());
+  order.resize(most);
+  std::sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  std::vector<Shown> kept;
+  for (const auto& [importance, i] : order) kept.push_back(shown[i]);
+  shown = std::move(kept);
 }
 
 Outcome<std::vector<runtime::MetavoxelEffect>> effectsOf(const BillowSpace& space, const BillowDrawInfo& draw) {
@@ -142,8 +169,13 @@ Outcome<runtime::MetavoxelDraw> drawOf(const BillowDrawInfo& draw, const std::ve
 }  // namespace
 
 Outcome<void> drawInSpace(BillowSpace& space, VkCommandBuffer commands, const BillowDrawInfo& draw) {
-  const auto shown = shownBy(*space.context, draw);
+  auto shown = shownBy(*space.context, draw);
   if (!shown) return tl::unexpected(shown.error());
+  if (draw.instances == nullptr) {
+    const auto view = viewOf(draw.view);
+    if (!view) return tl::unexpected(view.error());
+    keepLargest(view->eye, space.config.maxVolumes, *shown);
+  }
   if (shown->size() > space.config.maxVolumes) {
     return badArgument("BillowDrawInfo: " + std::to_string(shown->size()) + " instances; the space takes " +
                        std::to_string(space.config.maxVolumes));

@@ -55,20 +55,22 @@ BillowStats statsOf(const BillowContext& context) {
 }
 
 // The context's own come first: they are older.
-Outcome<void> takeError(BillowContext& context) {
+Outcome<void> takeError(BillowContext& context, BillowError* into) {
   if (!context.late.empty()) {
-    Problem oldest = std::move(context.late.front());
+    report(context.late.front(), into);
     context.late.erase(context.late.begin());
-    return tl::unexpected(std::move(oldest));
+    return {};
   }
   const auto error = context.streamer->takeError();
   if (!error) return notReady("there is no error");
-  return tl::unexpected(Problem{.result = resultOf(error->code),
-                                .message = error->message,
-                                .pack = error->asset.value,
-                                .volume = error->volume,
-                                .frame = error->frame,
-                                .page = error->page.value_or(BILLOW_NONE)});
+  report({.result = resultOf(error->code),
+          .message = error->message,
+          .pack = error->asset.value,
+          .volume = error->volume,
+          .frame = error->frame,
+          .page = error->page.value_or(BILLOW_NONE)},
+         into);
+  return {};
 }
 
 }  // namespace
@@ -97,7 +99,7 @@ void billowStats(const BillowContext* context, BillowStats* stats) {
 }
 
 BillowResult billowTakeError(BillowContext* context, BillowError* error) {
-  return answering(error, [&] { return takeError(*context); });
+  return answering(error, [&] { return takeError(*context, error); });
 }
 
 }  // extern "C"

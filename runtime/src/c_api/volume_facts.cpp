@@ -30,6 +30,13 @@ bool hasVelocity(const format::Pack& pack, const format::VolumeRecord& volume) {
   });
 }
 
+// What the pack says about the look, beside the runtime's defaults: without reading a page.
+runtime::Look plainLook(const format::VolumeRecord& volume) {
+  runtime::Look look;
+  runtime::applyLook(volume.look, look);
+  return look;
+}
+
 }  // namespace
 
 std::vector<VolumeFacts> volumeFacts(const format::Pack& pack) {
@@ -41,17 +48,12 @@ std::vector<VolumeFacts> volumeFacts(const format::Pack& pack) {
     facts.number = number;
     facts.grids = runtime::chooseGrids(pack, volume);
     facts.velocity = hasVelocity(pack, volume);
+    facts.look = plainLook(volume);
     if (volume.frameCount > 0) facts.box = runtime::worldBox(pack, volume, facts.grids, 0, volume.frameCount - 1);
     findVoxels(pack, volume, facts);
     all.push_back(facts);
   }
   return all;
-}
-
-runtime::Look plainLook(const format::VolumeRecord& volume) {
-  runtime::Look look;
-  runtime::applyLook(volume.look, look);
-  return look;
 }
 
 double secondsOf(const format::Pack& pack, const format::VolumeRecord& volume) {

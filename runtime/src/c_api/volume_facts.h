@@ -2,7 +2,6 @@
 #ifndef BILLOW_RUNTIME_C_API_VOLUME_FACTS_H
 #define BILLOW_RUNTIME_C_API_VOLUME_FACTS_H
 
-#include <optional>
 #include <vector>
 
 #include "billow/format/pack.h"
@@ -17,14 +16,11 @@ struct VolumeFacts {
   double voxelSize = 0;                   // the smallest edge of a voxel; 0: nothing is active
   std::array<double, 3> anchor{0, 0, 0};  // where such a voxel's centre lies
   bool velocity = false;
-  std::optional<runtime::Look> look = {};  // the suggested one, once it is fitted
+  runtime::Look look = {};  // the suggested one; the plain one until that is fitted
 };
 
-// Of the volumes that can be played.
+// Of the volumes that can be played, with plain looks.
 std::vector<VolumeFacts> volumeFacts(const format::Pack& pack);
-
-// What the pack says about the look, beside the runtime's defaults: without reading a page.
-runtime::Look plainLook(const format::VolumeRecord& volume);
 
 // From the first frame's begin to the last one's end.
 double secondsOf(const format::Pack& pack, const format::VolumeRecord& volume);
