@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -33,6 +34,17 @@ struct Arguments {
   bool json = false;
 };
 
+// Without its dependencies a build system would take the pack for one that is up to date: it goes then.
+void writeDependencies(const Arguments& arguments, const std::set<std::string>& inputs) {
+  try {
+    writeDepfile(arguments.depfile, arguments.output, inputs);
+  } catch (const compiler::Error&) {
+    std::error_code ignored;
+    std::filesystem::remove(arguments.output, ignored);
+    throw;
+  }
+}
+
 int runCompile(const Arguments& arguments) {
   if (arguments.metric == "depth" && !arguments.psnr && !arguments.budget.any()) {
     throw compiler::Error(compiler::Fault::commandLine, "--metric depth needs --psnr, --gpu-budget or --disk-budget");
@@ -52,7 +64,7 @@ int runCompile(const Arguments& arguments) {
   options.threads = arguments.threads;
   options.progress = drawProgress;
   const compiler::CompileReport report = compiler::compile(arguments.inputs, arguments.output, options, printWarning);
-  if (!arguments.depfile.empty()) writeDepfile(arguments.depfile, arguments.output, report.inputs);
+  if (!arguments.depfile.empty()) writeDependencies(arguments, report.inputs);
   if (arguments.json) {
     fmt::print("{}\n",
                reportJson(report, arguments.output).dump(2, ' ', false, nlohmann::json::error_handler_t::replace));

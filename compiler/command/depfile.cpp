@@ -1,8 +1,11 @@
 #include "depfile.h"
 
+#include <fmt/format.h>
+
 #include <filesystem>
 #include <fstream>
 
+#include "import_options.h"
 #include "stages.h"
 
 namespace billow::command {
@@ -35,7 +38,13 @@ bool holds(const std::string& folder, const std::string& file) {
 void writeDepfile(const std::string& path, const std::string& output, const std::set<std::string>& inputs) {
   std::string rule = escaped(output) + ":";
   for (const std::string& input : inputs) {
-    if (holds(input, output)) continue;
+    if (holds(input, output)) {
+      printWarning(
+          fmt::format("--depfile: the pack lies in {}, which is searched for inputs: a build will not see ones that "
+                      "come or go there",
+                      input));
+      continue;
+    }
     rule += " \\\n  " + escaped(input);
   }
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
