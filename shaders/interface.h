@@ -86,11 +86,10 @@ BILLOW_GPU_CONST kLayerCount = 4u;
 // One of several layers that the direct march draws at once, behind the MarchParams that all share.
 struct LayerParams {
   vec4 share;    // x: weight of its extinction and emission
-  vec4 flow[3];  // as MarchParams has them, as has what follows
-  uvec4 bricks;
-  GridParams grids[6];
+  uvec4 bricks;  // as MarchParams has them
+  GridParams grids[3];
 };
-BILLOW_GPU_SIZE(LayerParams, 5 * 16 + 6 * 160);
+BILLOW_GPU_SIZE(LayerParams, 2 * 16 + 3 * 160);
 
 #ifdef __cplusplus
 }  // namespace billow::runtime::gpu

@@ -1,9 +1,8 @@
-// What the direct march reads of several layers, or of one that is carried along its velocity: their sum.
+// What the direct march reads of several layers: their sum. None is carried along its velocity; metavoxels do that.
 #ifndef BILLOW_LAYER_SUM
 #define BILLOW_LAYER_SUM
 
 #include "medium.glsl"
-#include "velocity.glsl"
 
 struct Matter {
   float extinction;
@@ -16,23 +15,10 @@ struct Rays {  // from the eye; in each grid's space it is made where it is need
 
 Rays raysAlong(vec3 direction) { return Rays(direction); }
 
-// By how much the layer's matter is carried at the velocity of a place (world, relative to the eye).
-vec3 wayAt(vec3 p) {
-  const vec4 x = layers[layerNow].flow[0];
-  const vec4 y = layers[layerNow].flow[1];
-  const vec4 z = layers[layerNow].flow[2];
-  const vec3 most = vec3(x.w, y.w, z.w);
-  const vec3 velocity = velocityAt(p, mat3(most.x, 0.0, 0.0, 0.0, most.y, 0.0, 0.0, 0.0, most.z));
-  return clamp(vec3(dot(x.xyz, velocity), dot(y.xyz, velocity), dot(z.xyz, velocity)), -most, most);
-}
-
-// Where what is now at p was in the layer's frame, as metavoxel_carry.glsl has it.
-vec3 carriedFrom(vec3 p) { return carries() ? p - wayAt(p - 0.5 * wayAt(p)) : p; }
-
 Matter matterAt(Rays rays, float t) {
   Matter sum = Matter(0.0, vec3(0.0));
   for (layerNow = 0u; layerNow < kLayers; ++layerNow) {
-    const vec3 p = carriedFrom(rays.direction * t);
+    const vec3 p = rays.direction * t;
     float value[kMatterSlots];
     for (uint g = 0u; g < kMatterSlots; ++g) value[g] = hasGrid(g) ? sampleGrid(g, indexOf(g, p), kFilter) : 0.0;
     const float weight = layers[layerNow].share.x;
@@ -99,7 +85,7 @@ ShadowRay shadowRay(vec3 p, out float voxels) {
 float shadowExtinction(ShadowRay shadow, float t) {
   float sum = 0.0;
   for (layerNow = 0u; layerNow < kLayers; ++layerNow) {
-    const vec3 p = carriedFrom(shadow.from + params.sun.xyz * t);
+    const vec3 p = shadow.from + params.sun.xyz * t;
     sum += layers[layerNow].share.x * extinctionOf(sampleGrid(extinctionSlot(), indexOf(extinctionSlot(), p), kShadow));
   }
   return sum;

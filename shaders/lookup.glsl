@@ -4,6 +4,14 @@
 
 #include "brick.glsl"
 
+// From the world, relative to the eye, to pack index space.
+vec3 indexOf(uint g, vec3 p) {
+  const vec4 x = BILLOW_GRID(g).toIndex[0];
+  const vec4 y = BILLOW_GRID(g).toIndex[1];
+  const vec4 z = BILLOW_GRID(g).toIndex[2];
+  return vec3(dot(x.xyz, p), dot(y.xyz, p), dot(z.xyz, p)) + vec3(x.w, y.w, z.w);
+}
+
 uint node5Bit(uvec3 cell) { return (cell.x >> 4) << 10 | (cell.y >> 4) << 5 | cell.z >> 4; }
 uint node4Bit(uvec3 cell) { return (cell.x & 15u) << 8 | (cell.y & 15u) << 4 | (cell.z & 15u); }
 

@@ -33,20 +33,8 @@ vec2 crossBox(Ray ray, vec3 low, vec3 high) {
   return vec2(max(max(near.x, near.y), near.z), min(min(far.x, far.y), far.z));
 }
 
-// By how far, in pack indices, what the grid holds may be carried.
-vec3 carriedFarthest(uint g) {
-#ifdef BILLOW_LAYERS
-  const vec3 most = vec3(layers[layerNow].flow[0].w, layers[layerNow].flow[1].w, layers[layerNow].flow[2].w);
-  return vec3(dot(abs(BILLOW_GRID(g).toIndex[0].xyz), most), dot(abs(BILLOW_GRID(g).toIndex[1].xyz), most),
-              dot(abs(BILLOW_GRID(g).toIndex[2].xyz), most));
-#else
-  return vec3(0.0);
-#endif
-}
-
 vec2 crossGrid(uint g, Ray ray) {
-  const vec3 farthest = carriedFarthest(g);
-  return crossBox(ray, BILLOW_GRID(g).boxMin.xyz - farthest, BILLOW_GRID(g).boxMax.xyz + farthest);
+  return crossBox(ray, BILLOW_GRID(g).boxMin.xyz, BILLOW_GRID(g).boxMax.xyz);
 }
 
 // Log2 of the voxels that the skippable node around `cell` spans: 7 for an absent Node4, 3 for an absent Node3;
@@ -102,11 +90,6 @@ float skipEmpty(uint g, Ray ray, float t) {
   vec3 low, high;
   const vec3 p = ray.origin + ray.direction * t;
   if (!emptyBox(g, p, low, high)) return t;
-#ifdef BILLOW_LAYERS
-  low += carriedFarthest(g);
-  high -= carriedFarthest(g);
-  if (any(lessThanEqual(p, low)) || any(greaterThanEqual(p, high))) return t;
-#endif
   const float exit = crossBox(ray, low, high).y;
   return exit >= range.y ? kFar : max(exit, t);
 }

@@ -8,13 +8,6 @@
 
 bool carries() { return kGrids >> kVelocityXSlot != 0u; }
 
-vec3 indexOf(uint g, vec3 p) {
-  const vec4 x = BILLOW_GRID(g).toIndex[0];
-  const vec4 y = BILLOW_GRID(g).toIndex[1];
-  const vec4 z = BILLOW_GRID(g).toIndex[2];
-  return vec3(dot(x.xyz, p), dot(y.xyz, p), dot(z.xyz, p)) + vec3(x.w, y.w, z.w);
-}
-
 // The grid that says which voxels are active: the components' are the same ones.
 uint firstVelocity() {
   if (hasGrid(kVelocityXSlot)) return kVelocityXSlot;

@@ -142,7 +142,6 @@ class Painter {
                                             job.request.volumes[0].place, moment.time));
       }
       draw.layers = shown.layers[0];
-      draw.velocityScale = job.request.velocityScale;
       draw.look = shown.volumes[0].look;
     }
     auto picture = metavoxels_ ? metavoxels_->render(*gpu_, *renderer_, draw, shown) : gpu_->render(*renderer_, draw);

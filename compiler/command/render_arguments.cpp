@@ -275,7 +275,7 @@ Checked<void> applyMethod(const RenderArguments& arguments, RenderRequest& reque
   using enum runtime::Interpolation;
   const std::string interpolate = arguments.interpolate.value_or("hold");
   request.interpolate = interpolate == "advect" ? advect : interpolate == "blend" ? blend : hold;
-  const bool needed = request.scene || !request.effects.empty();
+  const bool needed = request.scene || !request.effects.empty() || request.interpolate == advect;
   request.method = arguments.method ? (*arguments.method == "direct" ? Method::direct : Method::metavoxel)
                    : needed         ? Method::metavoxel
                                     : Method::direct;
@@ -284,6 +284,9 @@ Checked<void> applyMethod(const RenderArguments& arguments, RenderRequest& reque
   // More of them imitate what is now found.
   if (request.surroundings > 0 && !request.look.scatteringOrders) request.look.scatteringOrders = 1;
   if (request.method == Method::metavoxel) return {};
+  if (request.interpolate == advect) {
+    return refuse(kCommandLine, "--interpolate advect is drawn by --method metavoxel alone, not by \"direct\"");
+  }
   if (request.surroundings > 0) {
     return refuse(kCommandLine, "--surroundings is drawn by --method metavoxel alone, not by \"direct\"");
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "billow/format/affine.h"
@@ -79,27 +80,9 @@ template <class Params>
 void addFrame(const ResidentFrame& frame, const std::array<double, 3>& eye, Filter widest, Params& params) {
   params.bricks = addresses(0, frame.bricks_);
   params.bricks.x = frame.shape_.xBits | frame.shape_.yBits << 8;
-  for (std::uint32_t slot = 0; slot < gpu::kGridSlots; ++slot) {
+  for (std::size_t slot = 0; slot < std::size(params.grids); ++slot) {
     if (frame.grids_[slot].present) params.grids[slot] = gridParams(frame.grids_[slot], eye, widest);
   }
-}
-
-// Of the world box of what is active.
-double longestEdge(const ResidentFrame& frame) {
-  double longest = 0;
-  for (std::uint32_t slot = 0; slot < gpu::kMatterSlots; ++slot) {
-    const ResidentGrid& grid = frame.grids_[slot];
-    if (!grid.present) continue;
-    for (int row = 0; row < 3; ++row) {
-      double edge = 0;
-      for (int i = 0; i < 3; ++i) {
-        edge +=
-            std::abs(grid.frame.indexToWorld[row * 4 + i]) * (grid.frame.activeMax[i] - grid.frame.activeMin[i] + 1);
-      }
-      longest = std::max(longest, edge);
-    }
-  }
-  return longest;
 }
 
 // One box serves both marches.
@@ -127,9 +110,6 @@ LayeredParams layeredParams(std::span<const Layer> layers, const DrawInfo& draw)
     gpu::LayerParams& layer = params.layers[i];
     addFrame(frameOf(layers[i]), draw.view.eye, widestOf(draw.quality), layer);
     layer.share = {layers[i].weight, 0, 0, 0};
-    const Flow flow = flowOf(layers[i], {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, double{draw.velocityScale},
-                             longestEdge(frameOf(layers[i])));
-    std::copy(flow.rows.begin(), flow.rows.end(), layer.flow);
   }
   return params;
 }

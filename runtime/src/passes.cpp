@@ -53,7 +53,7 @@ PassKey passKey(const FrameIndices& indices, Shader shader, Filter filter, Filte
 
 PassKey passKey(std::span<const Layer> layers, Shader shader, Filter filter, Filter shadow) {
   PassKey key = passKey(FrameIndices{}, shader, filter, shadow);
-  for (const Layer& layer : layers) addGrids(indicesOf(layer), key);
+  for (const Layer& layer : layers) addGrids(matterOf(frameOf(layer).indices()), key);
   key.layers = static_cast<std::uint32_t>(layers.size());
   return key;
 }

@@ -58,7 +58,6 @@ std::string missingFeatures(const EnabledFeatures& features) {
 
 const char* badField(const DrawInfo& draw) {
   if (const char* field = badLayers(draw.frame, draw.layers)) return field;
-  if (!std::isfinite(draw.velocityScale)) return "velocityScale";
   if (draw.width == 0 || draw.height == 0) return "width, height";
   if (draw.color == VK_NULL_HANDLE || draw.depth == VK_NULL_HANDLE) return "color, depth";
   for (const char* field : {badView(draw.view), badSun(draw.sun), badBackground(draw.background), badLook(draw.look),
@@ -146,9 +145,7 @@ class RendererImpl final : public Renderer {
   }
 
   // Nothing, or one layer that stays where it is: these have a shader of their own.
-  static bool plain(std::span<const Layer> layers) {
-    return layers.empty() || (layers.size() == 1 && !carried(layers[0]));
-  }
+  static bool plain(std::span<const Layer> layers) { return layers.size() <= 1; }
 
   static PassKey keyOf(std::span<const Layer> layers, const DrawInfo& draw) {
     const Quality& quality = draw.quality;

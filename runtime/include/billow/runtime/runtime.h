@@ -205,10 +205,7 @@ struct Background {
 
 struct DrawInfo {
   const Frame* frame = nullptr;        // null where there are layers
-  std::span<const Layer> layers = {};  // in place of the frame: at most kMostLayers
-  // World units a second that a velocity grid's 1 stands for, finite. What carries matter further along an axis of the
-  // world than the layer's box is long carries it as far as that.
-  float velocityScale = 1;
+  std::span<const Layer> layers = {};  // in place of the frame: at most kMostLayers; drawn as they are, not carried
   View view = {};
   Sun sun = {};
   Look look = {};
