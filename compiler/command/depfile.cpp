@@ -51,6 +51,9 @@ void writeDepfile(const std::string& path, const std::string& output, const std:
   file << rule << '\n';
   file.close();
   if (!file) throw compiler::Error(compiler::Fault::file, path + ": cannot be written");
+  // Make takes a depfile that is newer than its output for news, and would compile once more.
+  std::error_code ignored;
+  std::filesystem::last_write_time(path, std::filesystem::last_write_time(output, ignored), ignored);
 }
 
 }  // namespace billow::command
