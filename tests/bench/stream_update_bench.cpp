@@ -57,6 +57,7 @@ class InstantTransport final : public runtime::Transport {
   void releaseCpu(std::uint64_t) override {}
   runtime::TransportStats stats() const override { return {}; }
   void run(void (*job)(void*), void* context) override { job(context); }
+  void read(void (*job)(void*), void* context) override { job(context); }
 
  private:
   runtime::StreamConfig config_;
