@@ -170,6 +170,54 @@ TEST_F(StreamGpu, ACorruptPageIsToldAndTheRestPlaysOn) {
   EXPECT_FALSE(streamer_->takeError()) << "the same page is told once";
 }
 
+// A host's source whose reads end at once, and a job system that begins nothing until it is told to.
+TEST_F(StreamGpu, APackThatIsBeingOpenedOutlivesADevice) {
+  class Memory final : public runtime::AsyncSource {
+   public:
+    explicit Memory(std::vector<std::byte> bytes) : bytes_(std::move(bytes)) {}
+    std::uint64_t size() const override { return bytes_.size(); }
+    void read(std::uint64_t offset, std::span<std::byte> into, runtime::ReadDone done) override {
+      std::copy_n(bytes_.begin() + static_cast<std::ptrdiff_t>(offset), into.size(), into.begin());
+      done.call(done.context, true);
+    }
+
+   private:
+    std::vector<std::byte> bytes_;
+  };
+  struct Stored {
+    std::mutex mutex;
+    std::vector<std::pair<void (*)(void*), void*>> jobs;
+    static void submit(void* user, void (*job)(void*), void* context) {
+      auto& self = *static_cast<Stored*>(user);
+      const std::lock_guard lock(self.mutex);
+      self.jobs.emplace_back(job, context);
+    }
+    void runAll() {
+      std::unique_lock lock(mutex);
+      const auto taken = std::exchange(jobs, {});
+      lock.unlock();
+      for (const auto& [job, context] : taken) job(context);
+    }
+  } stored;
+  create({.threads = 0, .jobs = {.submit = &Stored::submit, .user = &stored}});
+  const auto source = std::make_shared<Memory>(sequencePack(8, someBricks));
+  const AssetId asset = valueOf(streamer_->openLater({.source = source}), "openLater");
+  update();
+  EXPECT_EQ(streamer_->state(asset), runtime::Streamer::AssetState::opening);
+  streamer_->detach();
+  stored.runAll();  // too late: they do nothing
+  ASSERT_TRUE(streamer_->attach(*renderer_));
+  update();
+  EXPECT_EQ(streamer_->state(asset), runtime::Streamer::AssetState::opening);
+  stored.runAll();
+  update();
+  EXPECT_EQ(streamer_->state(asset), runtime::Streamer::AssetState::ready);
+  EXPECT_TRUE(streamer_->openLater({.source = source}));
+  streamer_.reset();
+  stored.runAll();
+  EXPECT_EQ(source.use_count(), 1) << "nobody holds it any more";
+}
+
 TEST_F(StreamGpu, ADeviceIsLeftAndTakenUpAgain) {
   const PackFile file(sequencePack(8, someBricks));
   create();
