@@ -170,7 +170,7 @@ void TransportCore::decode(Load& load) {
   load.upload = {.buffer = load.loaded.buffer, .atlas = load.loaded.atlas, .shape = load.loaded.shape};
   const auto need = heap_.need(load.loaded.buffer.size(), load.loaded.shape);
   if (!need) {
-    if (need.error().code == ErrorCode::vulkan) fail(need.error());
+    if (isVulkan(need.error().code)) fail(need.error());
     return finish(load, need.error());
   }
   load.gpuBytes = *need;
