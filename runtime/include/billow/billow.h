@@ -347,7 +347,7 @@ typedef enum BillowPackState {
   BILLOW_PACK_UNKNOWN = 0, /* closed, or never was */
   BILLOW_PACK_OPENING = 1,
   BILLOW_PACK_READY = 2,
-  BILLOW_PACK_FAILED = 3, /* could not be opened; to be closed */
+  BILLOW_PACK_FAILED = 3, /* could not be opened; to be closed, or reloaded */
   BILLOW_PACK_STATE_MAX_ENUM = 0x7fffffff
 } BillowPackState;
 
