@@ -10,6 +10,7 @@ namespace billow::viewer {
 namespace {
 
 constexpr float kSide = 300, kBelow = 78;  // sizes of the panels
+constexpr float kLabel = 92;               // that a slider's name takes
 constexpr std::size_t kMostErrors = 5;
 constexpr double kMessageSeconds = 4;
 constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
@@ -120,7 +121,8 @@ Asked Panels::draw(Document& document, OrbitCamera& camera, const Report& report
 }
 
 void Panels::drawSide(Document& document, OrbitCamera& camera, const Report& report, Asked& asked) {
-  ImGui::PushItemWidth(ImGui::GetContentRegionAvail().x * 0.58f);
+  const float room = ImGui::GetContentRegionAvail().x;
+  ImGui::PushItemWidth(std::clamp(room - kLabel, room * 0.4f, room * 0.58f));
   const ImGuiTreeNodeFlags open = ImGuiTreeNodeFlags_DefaultOpen;
   if (document.choices().size() > 1) drawContents(document, asked);
   if (ImGui::CollapsingHeader("Look", open)) drawLook(document, asked);
