@@ -33,7 +33,7 @@ class RangeAllocator {
 
   std::uint64_t size_;
   std::uint64_t used_ = 0;
-  std::size_t taken_ = 0;     // ranges that are not free
+  std::size_t taken_ = 0;    // ranges that are not free
   std::vector<Range> free_;  // ascending, none touches the next
 };
 
