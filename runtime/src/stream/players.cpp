@@ -323,6 +323,7 @@ void Players::take(std::span<Change> changes, Transport& transport) {
 }
 
 void Players::advance(double seconds, std::uint64_t update) {
+  const auto passing = static_cast<float>(std::max(seconds, kLeastPassing));
   count_ = {};
   for (std::size_t i = 0; i < views_.size(); ++i) {
     InstanceView& view = views_[i];
@@ -330,7 +331,7 @@ void Players::advance(double seconds, std::uint64_t update) {
     const double moved = view.playback.speed * seconds;
     view.phase = wrapPhase(track.clip->timeline, view.playback.loop, view.phase + moved);
     Shown& shown = shown_[i];
-    chooseLayers(track, view, players_[i], shown, moved, static_cast<float>(seconds), update);
+    chooseLayers(track, view, players_[i], shown, moved, passing, update);
     view.drawn = shown.items;
     view.drawnCount = shown.count;
     view.held = shown.held;

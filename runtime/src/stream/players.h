@@ -55,6 +55,9 @@ struct InstanceCount {
   std::uint32_t all = 0, held = 0, coarse = 0, empty = 0;
 };
 
+// Seconds that an update() counts for at least, in what is not play: a game that stands still gets its detail too.
+inline constexpr double kLeastPassing = 1.0 / 240;
+
 class Players {
  public:
   std::uint32_t openClip(std::shared_ptr<const Clip> clip);

@@ -325,7 +325,7 @@ class StreamerImpl final : public Streamer {
 
   void advance(const UpdateInfo& info) {
     const double seconds = std::isfinite(info.seconds) ? std::max(info.seconds, 0.0) : 0;
-    now_ += seconds;
+    now_ += std::max(seconds, kLeastPassing);
     ++stats_.updates;
     bury();
     if (transport_ == nullptr) return players_.advance(seconds, stats_.updates);
