@@ -261,7 +261,7 @@ TEST_F(StreamDevice, ALostDeviceEndsEveryLoadOnce) {
           EXPECT_TRUE(ended.insert(arrival.ticket).second);
           if (arrival.frame) continue;
           ++failed;
-          EXPECT_EQ(arrival.frame.error().code, ErrorCode::vulkan) << arrival.frame.error().message;
+          EXPECT_TRUE(isVulkan(arrival.frame.error().code)) << arrival.frame.error().message;
         }
         arrivals.clear();
         return ended.size() == 8;
@@ -271,7 +271,7 @@ TEST_F(StreamDevice, ALostDeviceEndsEveryLoadOnce) {
       // Later ones end at once.
       const auto late = loadOne(*transport, orderOf(pack, 0, 99));
       ASSERT_FALSE(late.frame);
-      EXPECT_EQ(late.frame.error().code, ErrorCode::vulkan);
+      EXPECT_TRUE(isVulkan(late.frame.error().code));
       transport.reset();
       gpu().waitIdle();
     }

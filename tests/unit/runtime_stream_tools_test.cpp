@@ -237,7 +237,7 @@ TEST_F(VulkanFaultsTest, AllocationsAndSubmissionsFailAsTold) {
   VulkanFaults::get().setFaults({.deviceLost = true});
   const auto lost = renderer->upload(pack, 0, 0, {});
   ASSERT_FALSE(lost.has_value());
-  EXPECT_EQ(lost.error().code, runtime::ErrorCode::vulkan);
+  EXPECT_EQ(lost.error().code, runtime::ErrorCode::deviceLost);
   EXPECT_GT(VulkanFaults::get().stats().lost, 0u);
   VulkanFaults::get().setFaults({});
   const auto frame = renderer->upload(pack, 0, 0, {});
