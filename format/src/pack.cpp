@@ -153,7 +153,9 @@ const GridFrame& Pack::gridFrame(const VolumeRecord& volume, std::uint32_t frame
 }
 
 std::span<const LevelRecord> Pack::levelsOf(std::uint32_t volume) const {
-  const auto [begin, end] = std::ranges::equal_range(levels_, volume, {}, &LevelRecord::volume);
+  const auto before = [](const LevelRecord& level, std::uint32_t number) { return level.volume < number; };
+  const auto begin = std::lower_bound(levels_.begin(), levels_.end(), volume, before);
+  const auto end = std::lower_bound(begin, levels_.end(), volume + 1, before);
   return {begin, end};
 }
 

@@ -19,7 +19,7 @@ struct ZstdSettings {
   int level;
   ZSTD_literalCompressionMode_e literals;
 };
-constexpr ZstdSettings kUsual{3, ZSTD_lcm_auto}, kQuickLook{1, ZSTD_lcm_auto};
+constexpr ZstdSettings kUsual{9, ZSTD_lcm_auto}, kQuickLook{1, ZSTD_lcm_auto};
 // What is not found again is left as it is: reading is half as fast again, and a longer search makes up for the size.
 constexpr ZstdSettings kFastReading{9, ZSTD_lcm_uncompressed};
 

@@ -87,7 +87,7 @@ TEST_F(RenderMetavoxel, DrawsVolumesAndEffectsAloneAndTogether) {
 
 TEST_F(RenderMetavoxel, RefusesWhatItCannotDo) {
   expectRefused("--frame 7 --method voxels", "--method");
-  expectRefused("", "--frame of a volume, or --effect");
+  expectRefused("", "--frame or --time of a volume, or --effect");
   expectRefused("--effect balls", "--time");
   expectRefused("--frame 7 --effect balls --time 1", "--time");
   expectRefused("--frame 7 --effect balls --method direct", "direct");
