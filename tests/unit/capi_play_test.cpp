@@ -208,7 +208,12 @@ TEST_F(CapiPlay, AfterTheDeviceIsReplacedItGoesOn) {
   info.color = after.color->view();
   info.depth = after.depth->view();
   ASSERT_EQ(draw(context, info).code, BILLOW_OK);
-  EXPECT_EQ(before.rgba(), after.rgba());
+  // Metavoxels lie elsewhere in the pool, where filtering rounds otherwise.
+  const auto was = before.rgba(), is = after.rgba();
+  ASSERT_EQ(was.size(), is.size());
+  for (std::size_t i = 0; i < was.size(); ++i) {
+    ASSERT_NEAR(static_cast<double>(was[i]), static_cast<double>(is[i]), 1e-2) << i;
+  }
 }
 
 struct Counted {
