@@ -15,7 +15,8 @@ cmake_policy(VERSION 3.21...3.25)
 # PACK: relative to the binary folder.
 # ARGUMENT: of `billow compile`, such as --psnr 40.
 # DEPENDENCY: targets and files that must be built before, such as frames that a pattern finds or a manifest names.
-# Generators: Ninja and Makefiles.
+# Generators: Ninja and Makefiles. CMake's makefiles never forget an input: where a frame went, they compile in each
+#   build until the build folder is cleaned.
 function(billow_add_pack target)
   cmake_parse_arguments(PARSE_ARGV 1 pack "" "OUTPUT" "SOURCES;ARGS;DEPENDS")
   if(NOT pack_SOURCES OR NOT pack_OUTPUT OR pack_UNPARSED_ARGUMENTS)

@@ -47,11 +47,12 @@ END
   frames=$("$prefix/bin/billow" info "$folder/build/fire.blw" --json |
     python3 -c 'import json, sys; print(len(json.load(sys.stdin)["volumes"][0]["frames"]))')
   [ "$frames" -eq 3 ] || fail "the pack has $frames frames, expected 3"
-  rm "$folder/my fire/fire_0009.vdb"
-  step="a frame went" && compiles fire
+  # CMake's makefiles never forget an input: without a frame that went they compile in each build.
+  if [ "$generator" = Ninja ]; then
+    rm "$folder/my fire/fire_0009.vdb"
+    step="a frame went" && compiles fire
+  fi
   configure 31
   step="an argument changed" && compiles fire
-  # Make reads the depfile of the argument's build in the next one, and may compile once more.
-  [ "$generator" = Ninja ] || cmake --build "$folder/build" >/dev/null
   step="nothing changed after all" && compiles
 done
