@@ -178,6 +178,11 @@ TEST_F(ShareTest, FewEqualBricksMakeNoFrameReadOldPages) {
   writePack(grids, chosen);
   const format::Pack pack = open();
   for (const format::GridFrame& frame : pack.gridFrames()) EXPECT_LE(frame.pageListCount, 3u);
+  // Equal frames are the same all the same, however their pages are filled.
+  grids.push_back(grids[2]);
+  chosen.push_back(chosen[2]);
+  writePack(grids, chosen);
+  EXPECT_EQ(open().gridFrames()[8].node5, pack.gridFrames()[2].node5);
 }
 
 // 64 zero bytes are a uniform brick of one bit as well as a coarse one.

@@ -35,12 +35,22 @@ constexpr std::uint32_t kNode5Children = 1u << (3 * format::kNode5Log2);
 // A tile that is cut up because the grid's origin is not aligned with it may become at most this many small ones.
 constexpr std::uint64_t kMaxCutTiles = 1u << 24;
 
-// A page is read for its equal content where that is at least one part of so many.
-constexpr std::uint32_t kLeastUse = 4;
+// An older page is read for its equal content where that is at least one part of so many, of the page or of the grid
+// frame. So a small frame that hardly changes keeps what stands still, and reads at most so many old pages for it.
+constexpr std::uint64_t kLeastUse = 4;
 
 // Equal bytes are one brick only where they mean the same; BC7's axes are told by the Node3.
 std::uint32_t meaningOf(const ChosenBrick& brick) {
   return format::isBc7(brick.encoding) ? format::kEncodingBc7Z : brick.encoding;
+}
+
+// What a record says of its source: frames of one tree may differ in it.
+void setSource(const ImportedGrid& grid, const ChosenGrid& chosen, format::GridFrame& frame) {
+  frame.sourceMin = grid.min;
+  frame.sourceMax = grid.max;
+  frame.squaredError = chosen.squaredError;
+  frame.maxError = chosen.maxError;
+  std::copy(grid.indexToWorld.begin(), grid.indexToWorld.end(), frame.indexToWorld);
 }
 
 void growPages(std::vector<std::uint32_t>& pages, std::uint32_t page) {
@@ -74,13 +84,9 @@ class TreeBuilder {
     frame_.node5 = format::kNone;
     frame_.background = grid_.background;
     frame_.valueMin = frame_.valueMax = grid_.background;
-    frame_.sourceMin = grid_.min;
-    frame_.sourceMax = grid_.max;
-    frame_.squaredError = chosen_.squaredError;
-    frame_.maxError = chosen_.maxError;
     frame_.activeVoxels = grid_.activeVoxels;
     for (int a = 0; a < 3; ++a) frame_.activeMax[a] = -1;
-    std::copy(grid_.indexToWorld.begin(), grid_.indexToWorld.end(), frame_.indexToWorld);
+    setSource(grid_, chosen_, frame_);
   }
 
   void setBox() {
@@ -351,20 +357,21 @@ void Sharer::countUse(Stream stream, const void* items, std::size_t bytes, std::
   const std::uint32_t* const known = find(keyOf(stream, items, bytes, meaning));
   if (known == nullptr) return;
   const std::uint32_t page = writer_.pageOf(stream, *known);
-  if (page < openPage_) pageUses_[page] += static_cast<std::uint32_t>(bytes);
+  if (page < openPage_) pageUses_[page] += bytes;
 }
 
-void Sharer::beginGrid(const ImportedGrid& grid, std::span<const ChosenBrick> bricks, const Key& content) {
+void Sharer::beginGrid(const ImportedGrid& grid, std::span<const ChosenBrick> bricks) {
   openPage_ = pageBytes_.empty() ? 0 : static_cast<std::uint32_t>(pageBytes_.size() - 1);
   pageUses_.clear();
+  std::uint64_t bytes = grid.leaves.size() * sizeof(format::Mask3);
   for (const Leaf& leaf : grid.leaves) countUse(Stream::mask, &leaf.active, sizeof leaf.active, 0);
   for (const ChosenBrick& brick : bricks) {
+    bytes += brick.payload.size();
     countUse(Stream::unit, brick.payload.data(), brick.payload.size(), meaningOf(brick));
   }
-  std::erase_if(pageUses_, [&](const auto& use) { return use.second < pageBytes_[use.first] / kLeastUse; });
-  if (const auto equal = pagesOfGrids_.find(content); equal != pagesOfGrids_.end()) {
-    for (const std::uint32_t page : equal->second) pageUses_[page] = pageBytes_[page];
-  }
+  std::erase_if(pageUses_, [&](const auto& use) {
+    return use.second < std::min<std::uint64_t>(bytes, pageBytes_[use.first]) / kLeastUse;
+  });
 }
 
 // Of all that a grid frame's tree is made from.
@@ -396,10 +403,15 @@ Sharer::Key Sharer::contentOf(const ImportedGrid& grid, std::span<const ChosenBr
 
 format::GridFrame Sharer::addGrid(const ImportedGrid& grid, const ChosenGrid& chosen, const std::string& where,
                                   std::vector<std::uint32_t>& pages) {
-  const Key content = contentOf(grid, chosen.bricks);
-  beginGrid(grid, chosen.bricks, content);
-  const format::GridFrame frame = TreeBuilder(*this, grid, chosen, where).build(pages);
-  pagesOfGrids_[content] = pages;
+  const auto [tree, isNew] = trees_.try_emplace(contentOf(grid, chosen.bricks));
+  if (isNew) {
+    beginGrid(grid, chosen.bricks);
+    tree->second.frame = TreeBuilder(*this, grid, chosen, where).build(tree->second.pages);
+  }
+  pages = tree->second.pages;
+  format::GridFrame frame = tree->second.frame;
+  setSource(grid, chosen, frame);
+  if (frame.node5 != format::kNone) placeOrigin(grid.indexToWorld, frame);
   return frame;
 }
 

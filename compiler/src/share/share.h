@@ -53,9 +53,9 @@ class Sharer {
   // Null where the content is new.
   const std::uint32_t* find(const Key& key) const;
 
-  // A grid frame begins: it reads the page that is open, those after it, and of older ones such of which it uses a good
-  // part, or which its equal reads. A few equal bytes in each of many pages would make it read them all.
-  void beginGrid(const ImportedGrid& grid, std::span<const ChosenBrick> bricks, const Key& content);
+  // A grid frame begins: it reads the page that is open, those after it, and of older ones such that hold a good part of
+  // it or that it uses a good part of. A few equal bytes in each of many pages would make it read them all.
+  void beginGrid(const ImportedGrid& grid, std::span<const ChosenBrick> bricks);
   static Key contentOf(const ImportedGrid& grid, std::span<const ChosenBrick> bricks);
   void countUse(format::Stream stream, const void* items, std::size_t bytes, std::uint32_t meaning);
 
@@ -66,8 +66,12 @@ class Sharer {
   std::unordered_map<Key, std::uint32_t, KeyHash> recent_, older_;
   std::vector<std::uint32_t> pageBytes_;                       // that were appended, by page
   std::uint32_t openPage_ = 0;                                 // when the grid frame began
-  std::unordered_map<std::uint32_t, std::uint32_t> pageUses_;  // bytes of older pages that it has as bricks and masks
-  std::unordered_map<Key, std::vector<std::uint32_t>, KeyHash> pagesOfGrids_;  // by content
+  std::unordered_map<std::uint32_t, std::uint64_t> pageUses_;  // bytes of older pages that it has as bricks and masks
+  struct Tree {
+    format::GridFrame frame{};
+    std::vector<std::uint32_t> pages;
+  };
+  std::unordered_map<Key, Tree, KeyHash> trees_;  // by content: equal grid frames are one tree, whatever lies between
 };
 
 }  // namespace billow::compiler
