@@ -53,8 +53,8 @@ class Sharer {
   // Null where the content is new.
   const std::uint32_t* find(const Key& key) const;
 
-  // A grid frame begins: it reads the page that is open, those after it, and of older ones such that hold a good part of
-  // it or that it uses a good part of. A few equal bytes in each of many pages would make it read them all.
+  // A grid frame begins: it reads the page that is open, those after it, and of older ones such that hold a good part
+  // of it or that it uses a good part of. A few equal bytes in each of many pages would make it read them all.
   void beginGrid(const ImportedGrid& grid, std::span<const ChosenBrick> bricks);
   static Key contentOf(const ImportedGrid& grid, std::span<const ChosenBrick> bricks);
   void countUse(format::Stream stream, const void* items, std::size_t bytes, std::uint32_t meaning);
