@@ -18,6 +18,7 @@ namespace billow::runtime {
 namespace {
 
 constexpr double kLongestReload = 30;     // seconds until what is drawn must be resident of the new pack
+constexpr double kLongestUpdate = 0.1;    // seconds of them: while a game hangs, nothing it wants is loaded either
 constexpr std::size_t kMostErrors = 256;  // that the host has not taken yet; the newest are dropped
 
 struct Asset {
@@ -306,7 +307,7 @@ class StreamerImpl final : public Streamer {
   void finishReloads(double seconds) {
     for (auto& [id, asset] : assets_) {
       if (!asset.next) continue;
-      asset.waited += seconds;
+      asset.waited += std::min(seconds, kLongestUpdate);
       if (players_.successorFailed(asset.id)) {
         abandonReload(asset);
       } else if (players_.succeed(asset.id)) {
