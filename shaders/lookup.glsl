@@ -72,52 +72,69 @@ float getVoxel(uint g, ivec3 voxel) {
   return recordVoxel(g, loadRecord(g, number), uvec3(voxel & 7));
 }
 
-// Exact trilinear interpolation between voxel centres, which are at integers: what each brick adds that has some of the
-// eight voxels. Two thirds of the footprints lie in one brick.
-float sampleTrilinear(uint g, vec3 p) {
+// The eight voxels around a place, whose centres are at integers. Two thirds of them lie in one brick; else each brick
+// has some.
+struct Footprint {
+  ivec3 cell;     // of the first voxel
+  uvec3 inner;    // the first voxel in its brick
+  bvec3 crosses;  // the axes along which the others lie in the next brick
+  uint axes;      // the same as bits
+  vec3 fraction;  // of the way to the others
+};
+
+Footprint footprintAt(vec3 p) {
   const vec3 base = floor(p);
-  const vec3 f = p - base;
   const ivec3 voxel = ivec3(base);
   const uvec3 inner = uvec3(voxel & 7);
   const bvec3 crosses = equal(inner, uvec3(7u));
   const uint axes = uint(crosses.x) | uint(crosses.y) << 1 | uint(crosses.z) << 2;
+  return Footprint(voxel >> 3, inner, crosses, axes, p - base);
+}
+
+// What of it lies in one brick: `beyond` are the axes along which that is the next one, every subset of `axes`.
+struct Part {
+  ivec3 cell;
+  uvec3 corner;  // of the brick's voxels, the lower
+  Weights weights;
+};
+
+Part partOf(Footprint at, uint beyond) {
+  const bvec3 next = notEqual(beyond & uvec3(1, 2, 4), uvec3(0u));
+  const vec3 f = at.fraction;
+  // In a brick before a face the upper corner is the last voxel, behind a face the lower corner is the first.
+  const Weights w = Weights(mix(mix(1.0 - f, vec3(0.0), at.crosses), f, next),
+                            mix(mix(f, 1.0 - f, at.crosses), vec3(0.0), next));
+  return Part(at.cell + ivec3(next), mix(min(at.inner, 6u), uvec3(0u), next), w);
+}
+
+// Exact trilinear interpolation: what each brick adds.
+float sampleTrilinear(uint g, vec3 p) {
+  const Footprint at = footprintAt(p);
   float sum = 0.0;
-  uint beyond = 0u;  // the axes along which the brick is the next one: every subset of `axes`
+  uint beyond = 0u;
   do {
-    const bvec3 next = notEqual(beyond & uvec3(1, 2, 4), uvec3(0u));
-    const uvec3 v = mix(min(inner, 6u), uvec3(0u), next);
-    // In a brick before a face the upper corner is the last voxel, behind a face the lower corner is the first.
-    const Weights w = Weights(mix(mix(1.0 - f, vec3(0.0), crosses), f, next),
-                              mix(mix(f, 1.0 - f, crosses), vec3(0.0), next));
-    const uint number = findRecord(g, (voxel >> 3) + ivec3(next));
+    const Part part = partOf(at, beyond);
+    const uint number = findRecord(g, part.cell);
     if (number == 0u) {
-      sum += BILLOW_GRID(g).boxMin.w * totalWeight(w);
+      sum += BILLOW_GRID(g).boxMin.w * totalWeight(part.weights);
     } else {
-      sum += recordCorners(g, loadRecord(g, number), v, w);
+      sum += recordCorners(g, loadRecord(g, number), part.corner, part.weights);
     }
-    beyond = beyond - axes & axes;
+    beyond = beyond - at.axes & at.axes;
   } while (beyond != 0u);
   return sum;
 }
 
 // How much of such an interpolation is of active voxels.
 float activeShare(uint g, vec3 p) {
-  const vec3 base = floor(p);
-  const vec3 f = p - base;
-  const ivec3 voxel = ivec3(base);
-  const uvec3 inner = uvec3(voxel & 7);
-  const bvec3 crosses = equal(inner, uvec3(7u));
-  const uint axes = uint(crosses.x) | uint(crosses.y) << 1 | uint(crosses.z) << 2;
+  const Footprint at = footprintAt(p);
   float share = 0.0;
   uint beyond = 0u;
   do {
-    const bvec3 next = notEqual(beyond & uvec3(1, 2, 4), uvec3(0u));
-    const uvec3 v = mix(min(inner, 6u), uvec3(0u), next);
-    const Weights w = Weights(mix(mix(1.0 - f, vec3(0.0), crosses), f, next),
-                              mix(mix(f, 1.0 - f, crosses), vec3(0.0), next));
-    const uint number = findRecord(g, (voxel >> 3) + ivec3(next));
-    if (number != 0u) share += activeWeight(g, loadRecord(g, number), v, w);
-    beyond = beyond - axes & axes;
+    const Part part = partOf(at, beyond);
+    const uint number = findRecord(g, part.cell);
+    if (number != 0u) share += activeWeight(g, loadRecord(g, number), part.corner, part.weights);
+    beyond = beyond - at.axes & at.axes;
   } while (beyond != 0u);
   return share;
 }

@@ -5,7 +5,6 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
-#include <deque>
 #include <functional>
 #include <map>
 #include <mutex>
@@ -14,6 +13,7 @@
 #include "api.h"
 #include "gpu_fixture.h"
 #include "stream/transport.h"
+#include "stream_host.h"
 
 namespace billow::tests {
 
@@ -126,54 +126,6 @@ class SlowDisk {
   bool ended_ = false;
   std::mt19937 random_;
   std::thread thread_;
-};
-
-// A game's job system with two threads.
-class HostJobs {
- public:
-  HostJobs() {
-    for (int i = 0; i < 2; ++i) threads_.emplace_back([this] { work(); });
-  }
-  ~HostJobs() {
-    {
-      const std::lock_guard lock(mutex_);
-      ended_ = true;
-    }
-    changed_.notify_all();
-    for (std::thread& thread : threads_) thread.join();
-  }
-  runtime::JobSystem system() {
-    return {.submit =
-                [](void* user, void (*job)(void*), void* context) {
-                  auto& self = *static_cast<HostJobs*>(user);
-                  {
-                    const std::lock_guard lock(self.mutex_);
-                    self.jobs_.push_back({job, context});
-                  }
-                  self.changed_.notify_one();
-                },
-            .user = this};
-  }
-
- private:
-  void work() {
-    std::unique_lock lock(mutex_);
-    for (;;) {
-      changed_.wait(lock, [&] { return ended_ || !jobs_.empty(); });
-      if (jobs_.empty()) return;
-      const auto [job, context] = jobs_.front();
-      jobs_.pop_front();
-      lock.unlock();
-      job(context);
-      lock.lock();
-    }
-  }
-
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<std::pair<void (*)(void*), void*>> jobs_;
-  bool ended_ = false;
-  std::vector<std::thread> threads_;
 };
 
 class StreamTest : public GpuTest {

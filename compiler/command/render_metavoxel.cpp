@@ -16,27 +16,6 @@ constexpr double kDefaultVoxels = 256;  // along the box's longest edge
 
 }  // namespace
 
-void addBox(const runtime::WorldBox& more, runtime::WorldBox& box) {
-  if (more.empty) return;
-  for (std::size_t i = 0; i < 3; ++i) {
-    box.min[i] = box.empty ? more.min[i] : std::min(box.min[i], more.min[i]);
-    box.max[i] = box.empty ? more.max[i] : std::max(box.max[i], more.max[i]);
-  }
-  box.empty = false;
-}
-
-void addParticles(const Particles& particles, runtime::WorldBox& box) {
-  for (const format::Particle& particle : particles) {
-    if (!(particle.radius > 0)) continue;
-    runtime::WorldBox ball{.empty = false};
-    for (std::size_t i = 0; i < 3; ++i) {
-      ball.min[i] = double{particle.center[i]} - double{particle.radius};
-      ball.max[i] = double{particle.center[i]} + double{particle.radius};
-    }
-    addBox(ball, box);
-  }
-}
-
 runtime::Result<MetavoxelPainter> MetavoxelPainter::make(runtime::Renderer& renderer,
                                                          const format::EffectTables& tables, const SpaceNeeds& needs,
                                                          std::uint64_t memoryBudget, Surroundings surroundings) {

@@ -13,8 +13,6 @@
 namespace billow::command {
 
 // The box grown to hold another, and the particles' bounding spheres.
-void addBox(const runtime::WorldBox& more, runtime::WorldBox& box);
-void addParticles(const Particles& particles, runtime::WorldBox& box);
 
 // What there is to draw at one moment.
 struct Shown {

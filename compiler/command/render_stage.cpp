@@ -22,7 +22,7 @@ char upOf(const Contents& contents) {
 Checked<Stage> stageOf(const Contents& contents, std::span<const double> times, SpaceNeeds& needs) {
   Stage stage{.box = {}, .up = upOf(contents), .burning = false, .ambientGiven = false};
   for (const PlacedVolume& volume : contents.volumes()) {
-    addBox(volume.box(), stage.box);
+    runtime::addBox(volume.box(), stage.box);
     stage.burning = stage.burning || volume.suggested.emissionScale * volume.request->look.fire > 0;
     stage.ambientGiven = stage.ambientGiven || format::isSet(volume.record().look, format::kLookAmbient);
   }
@@ -30,7 +30,7 @@ Checked<Stage> stageOf(const Contents& contents, std::span<const double> times, 
   needs.volumes = static_cast<std::uint32_t>(contents.volumes().size());
   for (const double time : times) {
     const Particles particles = contents.particlesAt(time);
-    addParticles(particles, stage.box);
+    runtime::addParticles(particles, stage.box);
     needs.particles = std::max(needs.particles, contents.mostParticles(time));
     if (!contents.volumes().empty()) continue;
     for (const format::Particle& particle : particles) {

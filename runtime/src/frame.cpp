@@ -155,17 +155,12 @@ Result<LoadedFrame> readFrame(const Device& device, const format::Pack& pack, st
 }
 
 ResidentGrid residentGrid(const LoadedGrid& grid, VkDeviceAddress buffer) {
-  return {.present = grid.present,
-          .frame = grid.frame,
-          .cells = grid.cells,
-          .index = grid.index,
-          .absent5 = grid.absent5,
-          .skippable = grid.skippable,
-          .table = buffer + grid.table,
-          .records = buffer + grid.records,
-          .masks = buffer + grid.masks,
-          .node4 = buffer + grid.node4,
-          .children = buffer + grid.children};
+  ResidentGrid resident{grid};
+  for (VkDeviceAddress* at :
+       {&resident.table, &resident.records, &resident.masks, &resident.node4, &resident.children}) {
+    *at += buffer;
+  }
+  return resident;
 }
 
 Result<FrameObjects> makeFrameObjects(Device& device, const LoadedFrame& loaded) {

@@ -13,16 +13,8 @@
 
 namespace billow::runtime {
 
-// One grid's part of a resident frame, ready to be written into GridParams.
-struct ResidentGrid {
-  bool present = false;
-  format::GridFrame frame{};
-  format::CellBox cells{};
-  Index index = Index::flat;
-  std::uint32_t absent5 = 0;
-  bool skippable = true;
-  VkDeviceAddress table = 0, records = 0, masks = 0, node4 = 0, children = 0;
-};
+// One grid's part of a resident frame, ready to be written into GridParams: its arrays lie at addresses.
+struct ResidentGrid : LoadedGrid {};
 
 // By slot: the index of each grid that the frame has; pipelines are made for it.
 using FrameIndices = std::array<std::optional<Index>, gpu::kGridSlots>;

@@ -117,6 +117,27 @@ Result<void> fitExtinction(const format::Pack& pack, const format::VolumeRecord&
 
 }  // namespace
 
+void addBox(const WorldBox& more, WorldBox& box) {
+  if (more.empty) return;
+  for (std::size_t i = 0; i < 3; ++i) {
+    box.min[i] = box.empty ? more.min[i] : std::min(box.min[i], more.min[i]);
+    box.max[i] = box.empty ? more.max[i] : std::max(box.max[i], more.max[i]);
+  }
+  box.empty = false;
+}
+
+void addParticles(std::span<const format::Particle> particles, WorldBox& box) {
+  for (const format::Particle& particle : particles) {
+    if (!(particle.radius > 0)) continue;
+    WorldBox ball{.empty = false};
+    for (std::size_t i = 0; i < 3; ++i) {
+      ball.min[i] = double{particle.center[i]} - double{particle.radius};
+      ball.max[i] = double{particle.center[i]} + double{particle.radius};
+    }
+    addBox(ball, box);
+  }
+}
+
 WorldBox worldBox(const format::Pack& pack, const format::VolumeRecord& volume, const GridChoice& grids,
                   std::uint32_t first, std::uint32_t last, const std::array<double, 12>& objectToWorld) {
   WorldBox box;

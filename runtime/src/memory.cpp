@@ -172,4 +172,25 @@ void Image::reset() {
   device_ = nullptr;
 }
 
+void changeLayout(const Api& api, VkCommandBuffer commands, VkImage image, VkImageLayout from, VkImageLayout to) {
+  auto barrier = begin<VkImageMemoryBarrier2>(VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2);
+  const bool first = from == VK_IMAGE_LAYOUT_UNDEFINED;
+  const bool copies = to == VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
+  barrier.srcStageMask = first ? VK_PIPELINE_STAGE_2_NONE : VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT;
+  barrier.srcAccessMask = first ? VK_ACCESS_2_NONE : VK_ACCESS_2_TRANSFER_WRITE_BIT;
+  // Draws wait on the semaphore, which makes the image visible to them.
+  barrier.dstStageMask = copies ? VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT : VK_PIPELINE_STAGE_2_NONE;
+  barrier.dstAccessMask = copies ? VK_ACCESS_2_TRANSFER_WRITE_BIT : VK_ACCESS_2_NONE;
+  barrier.oldLayout = from;
+  barrier.newLayout = to;
+  barrier.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+  barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+  barrier.image = image;
+  barrier.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+  auto info = begin<VkDependencyInfo>(VK_STRUCTURE_TYPE_DEPENDENCY_INFO);
+  info.imageMemoryBarrierCount = 1;
+  info.pImageMemoryBarriers = &barrier;
+  api.vkCmdPipelineBarrier2(commands, &info);
+}
+
 }  // namespace billow::runtime

@@ -86,6 +86,10 @@ class Image {
   VkMemoryRequirements requirements_{};
 };
 
+// Of an image of one level and layer that is written by copies: from undefined, to be copied to or to be read, and from
+// copied to, to be read. Whoever reads it waits for the upload.
+void changeLayout(const Api& api, VkCommandBuffer commands, VkImage image, VkImageLayout from, VkImageLayout to);
+
 }  // namespace billow::runtime
 
 #endif  // BILLOW_RUNTIME_MEMORY_H

@@ -126,7 +126,7 @@ TEST_F(StreamFailure, ADamagedPageIsNamedAndWhatFitsNowhereIsRefused) {
 TEST_F(StreamFailure, EndsAtAnyMoment) {
   const auto bytes = streamPack(8, 300);
   const auto renderer = makeRenderer();
-  HostJobs host;
+  HostJobs host(2);
   for (std::uint32_t seed = 0; seed < 24; ++seed) {
     std::mt19937 random(seed);
     StreamConfig config = smallConfig();
@@ -134,7 +134,7 @@ TEST_F(StreamFailure, EndsAtAnyMoment) {
     if (seed % 3 == 0) config.submission = Submission::own;
     if (seed % 3 == 1) {
       config.threads = config.readThreads = 0;
-      config.jobs = host.system();
+      config.jobs = host.callbacks();
     }
     const auto source = seed % 2 == 0 ? std::make_shared<TestSource>(bytes) : nullptr;
     std::optional<SlowDisk> disk;

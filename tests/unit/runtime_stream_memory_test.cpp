@@ -12,6 +12,7 @@
 #include "stream/jobs.h"
 #include "stream/range_allocator.h"
 #include "stream/staging_ring.h"
+#include "stream_host.h"
 
 namespace billow::tests {
 namespace {
@@ -165,33 +166,10 @@ TEST(StreamMemory, PiecesOfPendingBatchesAreNotGivenOut) {
   EXPECT_GT(full, 100u);
 }
 
-struct Counter {
-  std::atomic<std::uint64_t> now = 0, peak = 0;
-  std::atomic<bool> refuses = false;
-};
-
-runtime::Allocator allocatorOf(Counter& counter) {
-  return {.allocate = [](void* user, std::size_t size, std::size_t alignment) -> void* {
-            auto& counted = *static_cast<Counter*>(user);
-            if (counted.refuses) return nullptr;
-            const std::uint64_t now = counted.now += size;
-            std::uint64_t peak = counted.peak;
-            while (peak < now && !counted.peak.compare_exchange_weak(peak, now)) {
-            }
-            return ::operator new(size, std::align_val_t(alignment));
-          },
-          .release =
-              [](void* user, void* memory, std::size_t size, std::size_t alignment) {
-                static_cast<Counter*>(user)->now -= size;
-                ::operator delete(memory, std::align_val_t(alignment));
-              },
-          .user = &counter};
-}
-
 TEST(StreamMemory, CountsWhatManyThreadsTakeAndRefusesTheRest) {
   constexpr std::uint64_t kBudget = 100'000;
-  Counter counter;
-  CountedMemory memory(allocatorOf(counter), kBudget);
+  CountingAllocator counter;
+  CountedMemory memory(counter.callbacks(), kBudget);
   std::atomic<int> refused = 0;
   std::vector<std::thread> threads;
   for (std::uint32_t t = 0; t < 4; ++t) {
@@ -215,10 +193,10 @@ TEST(StreamMemory, CountsWhatManyThreadsTakeAndRefusesTheRest) {
   for (std::thread& thread : threads) thread.join();
   EXPECT_GT(refused, 0);
   EXPECT_LE(memory.peak(), kBudget);
-  EXPECT_LE(counter.peak, memory.peak());
+  EXPECT_LE(counter.stats().peak, memory.peak());
   EXPECT_EQ(memory.used(), 0u);
-  EXPECT_EQ(counter.now, 0u);
-  counter.refuses = true;
+  EXPECT_EQ(counter.stats().bytes, 0u);
+  counter.setFailures(1);
   EXPECT_THROW((void)memory.allocate(10, 8), std::bad_alloc);
   EXPECT_EQ(memory.used(), 0u) << "what the host refuses is not counted";
 }

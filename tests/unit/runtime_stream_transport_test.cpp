@@ -23,7 +23,7 @@ std::vector<std::uint32_t> firstFrames(std::uint32_t count) {
 
 TEST_F(StreamTransport, FramesReadAsThoseOfTheRenderer) {
   const auto pack = openStream(streamPack(6, 400, 3));
-  HostJobs host;
+  HostJobs host(2);
   for (const BlockUse blocks : {BlockUse::native, BlockUse::decoded}) {
     const auto renderer = makeRenderer({.blocks = blocks});
     for (const int variant : {0, 1, 2}) {
@@ -33,7 +33,7 @@ TEST_F(StreamTransport, FramesReadAsThoseOfTheRenderer) {
       if (variant == 1) config.submission = Submission::own;
       if (variant == 2) {
         config.threads = config.readThreads = 0;
-        config.jobs = host.system();
+        config.jobs = host.callbacks();
       }
       const auto transport = makeTransport(*renderer, config);
       auto frames = loadAll(*transport, pack, firstFrames(6));
@@ -131,10 +131,6 @@ TEST_F(StreamTransport, LoadsWaitForRoomAndTellHowMuch) {
   EXPECT_EQ(second.frame.error().code, ErrorCode::memory);
 }
 
-struct Counter {
-  std::atomic<std::uint64_t> now = 0, peak = 0;
-};
-
 // Everything at random: loads, cancels, evictions, budgets. The budgets hold, what arrives is right, and at the end
 // nothing is left.
 TEST_F(StreamTransport, RandomLoadsKeepToTheBudgetsAndLeaveNothing) {
@@ -148,8 +144,8 @@ TEST_F(StreamTransport, RandomLoadsKeepToTheBudgetsAndLeaveNothing) {
   };
   (void)settledBytes();
   const std::uint64_t before = settledBytes();
-  HostJobs host;
-  Counter counter;
+  HostJobs host(2);
+  CountingAllocator counter;
   for (std::uint32_t seed = 0; seed < 4; ++seed) {
     std::mt19937 random(seed);
     StreamConfig config = smallConfig();
@@ -158,22 +154,10 @@ TEST_F(StreamTransport, RandomLoadsKeepToTheBudgetsAndLeaveNothing) {
     if (seed % 2 == 1) config.submission = Submission::own;
     if (seed == 2) {
       config.threads = config.readThreads = 0;
-      config.jobs = host.system();
+      config.jobs = host.callbacks();
     }
-    config.allocator = {.allocate = [](void* user, std::size_t size, std::size_t alignment) -> void* {
-                          auto& counted = *static_cast<Counter*>(user);
-                          const std::uint64_t now = counted.now += size;
-                          std::uint64_t peak = counted.peak;
-                          while (peak < now && !counted.peak.compare_exchange_weak(peak, now)) {
-                          }
-                          return ::operator new(size, std::align_val_t(alignment));
-                        },
-                        .release =
-                            [](void* user, void* memory, std::size_t size, std::size_t alignment) {
-                              static_cast<Counter*>(user)->now -= size;
-                              ::operator delete(memory, std::align_val_t(alignment));
-                            },
-                        .user = &counter};
+    config.allocator = counter.callbacks();
+    counter.resetPeak();
     const std::uint64_t one = makeTransport(*renderer, config)->cost(orderOf(pack, 0, 1)).gpu;
     const std::uint64_t most = 6 * one;
     config.gpuBudget = most;
@@ -226,10 +210,11 @@ TEST_F(StreamTransport, RandomLoadsKeepToTheBudgetsAndLeaveNothing) {
       EXPECT_GT(arrived, 20);
       EXPECT_LE(transport->stats().gpuPeak, most);
       EXPECT_LE(transport->stats().cpuPeak, config.cpuBudget);
-      EXPECT_LE(counter.peak, config.cpuBudget);
+      EXPECT_LE(counter.stats().peak, config.cpuBudget);
       frames.clear();
     }
-    EXPECT_EQ(counter.now, 0u);
+    EXPECT_EQ(counter.stats().bytes, 0u);
+    EXPECT_EQ(counter.stats().wrong, 0u);
     EXPECT_EQ(settledBytes(), before);
   }
 }

@@ -31,7 +31,7 @@ Place placeAround(const BillowSpace& space, const std::vector<Shown>& shown,
   double finest = 0;
   for (const Shown& one : shown) {
     const std::array<double, 12>& m = one.instance->info.objectToWorld;
-    addBox(transformed(one.facts->box, m), box);
+    runtime::addBox(transformed(one.facts->box, m), box);
     const double edge = one.facts->voxelSize * scaleOf(m);
     if (!(edge > 0) || (finest > 0 && finest <= edge)) continue;
     finest = edge;
@@ -41,7 +41,7 @@ Place placeAround(const BillowSpace& space, const std::vector<Shown>& shown,
     }
   }
   for (const runtime::MetavoxelEffect& effect : effects) {
-    addBox(transformed(space.effectBoxes[effect.effect], effect.objectToWorld), box);
+    runtime::addBox(transformed(space.effectBoxes[effect.effect], effect.objectToWorld), box);
   }
   double squared = 0;
   for (std::size_t i = 0; i < 3 && !box.empty; ++i) {

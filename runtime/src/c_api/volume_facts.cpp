@@ -72,18 +72,9 @@ runtime::WorldBox transformed(const runtime::WorldBox& box, const std::array<dou
       }
       point.min[i] = point.max[i] = at;
     }
-    addBox(point, out);
+    runtime::addBox(point, out);
   }
   return out;
-}
-
-void addBox(const runtime::WorldBox& more, runtime::WorldBox& box) {
-  if (more.empty) return;
-  for (std::size_t i = 0; i < 3; ++i) {
-    box.min[i] = box.empty ? more.min[i] : std::min(box.min[i], more.min[i]);
-    box.max[i] = box.empty ? more.max[i] : std::max(box.max[i], more.max[i]);
-  }
-  box.empty = false;
 }
 
 }  // namespace billow::c_api

@@ -27,7 +27,6 @@ double secondsOf(const format::Pack& pack, const format::VolumeRecord& volume);
 
 // The box of a box's corners after the transform.
 runtime::WorldBox transformed(const runtime::WorldBox& box, const std::array<double, 12>& objectToWorld);
-void addBox(const runtime::WorldBox& more, runtime::WorldBox& box);
 
 }  // namespace billow::c_api
 

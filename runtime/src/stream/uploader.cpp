@@ -120,7 +120,8 @@ Result<bool> Uploader::open() {
   if (result != VK_SUCCESS) return vulkanError("vkBeginCommandBuffer", result);
   recording_ = commands;
   if (!emptyReady_) {
-    changeLayout(emptyAtlas_.handle(), VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
+    changeLayout(device_.api, recording_, emptyAtlas_.handle(), VK_IMAGE_LAYOUT_UNDEFINED,
+                 VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
   }
   emptyReady_ = true;
   return true;
@@ -224,7 +225,8 @@ Result<bool> Uploader::copyAtlas(Upload& upload) {
     if (piece.bytes == 0) return false;
     const DebugLabel label(device_.api, recording_, "billow upload atlas");
     if (at == 0) {
-      changeLayout(upload.target->image, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
+      changeLayout(device_.api, recording_, upload.target->image, VK_IMAGE_LAYOUT_UNDEFINED,
+                   VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
     }
     std::memcpy(ring_.bytes(piece).data(), upload.atlas.data() + at, piece.bytes);
     const std::uint64_t units = (piece.bytes + unit.bytes - 1) / unit.bytes;
@@ -235,7 +237,8 @@ Result<bool> Uploader::copyAtlas(Upload& upload) {
     bytesUploaded_ += piece.bytes;
     recordedBytes_ += piece.bytes;
   }
-  changeLayout(upload.target->image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
+  changeLayout(device_.api, recording_, upload.target->image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+               VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
   return true;
 }
 
@@ -270,27 +273,6 @@ void Uploader::recordAtlas(const Upload& upload, const AtlasUnit& unit, std::uin
   }
   device_.api.vkCmdCopyBufferToImage(recording_, ring_.buffer(), upload.target->image,
                                      VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, count, copies.data());
-}
-
-void Uploader::changeLayout(VkImage image, VkImageLayout from, VkImageLayout to) {
-  auto barrier = begin<VkImageMemoryBarrier2>(VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2);
-  const bool first = from == VK_IMAGE_LAYOUT_UNDEFINED;
-  const bool copies = to == VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
-  barrier.srcStageMask = first ? VK_PIPELINE_STAGE_2_NONE : VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT;
-  barrier.srcAccessMask = first ? VK_ACCESS_2_NONE : VK_ACCESS_2_TRANSFER_WRITE_BIT;
-  // Draws wait on the semaphore, which makes the image visible to them.
-  barrier.dstStageMask = copies ? VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT : VK_PIPELINE_STAGE_2_NONE;
-  barrier.dstAccessMask = copies ? VK_ACCESS_2_TRANSFER_WRITE_BIT : VK_ACCESS_2_NONE;
-  barrier.oldLayout = from;
-  barrier.newLayout = to;
-  barrier.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-  barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-  barrier.image = image;
-  barrier.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
-  auto info = begin<VkDependencyInfo>(VK_STRUCTURE_TYPE_DEPENDENCY_INFO);
-  info.imageMemoryBarrierCount = 1;
-  info.pImageMemoryBarriers = &barrier;
-  device_.api.vkCmdPipelineBarrier2(recording_, &info);
 }
 
 }  // namespace billow::runtime

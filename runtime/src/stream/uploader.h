@@ -75,7 +75,6 @@ class Uploader {
   Result<bool> copyBuffer(Upload& upload);
   Result<bool> copyAtlas(Upload& upload);
   void recordAtlas(const Upload& upload, const AtlasUnit& unit, std::uint64_t ringOffset, std::uint64_t units);
-  void changeLayout(VkImage image, VkImageLayout from, VkImageLayout to);
   RingSpace::Piece take(std::uint64_t least, std::uint64_t most, std::uint64_t unit);
 
   Device& device_;

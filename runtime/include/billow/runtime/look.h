@@ -4,7 +4,9 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 
+#include "billow/format/particle.h"
 #include "billow/runtime/runtime.h"
 
 namespace billow::runtime {
@@ -14,6 +16,10 @@ struct WorldBox {
   std::array<double, 3> max{0, 0, 0};
   bool empty = true;
 };
+
+void addBox(const WorldBox& more, WorldBox& box);
+// Of the balls that they are; those of radius 0 are not there.
+void addParticles(std::span<const format::Particle> particles, WorldBox& box);
 
 // The world box of what is active in frames [first, last] (indices into the volume's frames) of the chosen grids, in
 // the scene's world where there is one (MetavoxelVolume::objectToWorld).
