@@ -465,6 +465,7 @@ TEST_F(StreamPlan, UnderPressureTheLeastImportantIsCoarser) {
       for (std::uint32_t l = 0; l < drawable.count; ++l) {
         means = means || stream.transport().known(drawable.layers[l].frame).means;
       }
+      EXPECT_EQ(drawable.coarse, means) << "it tells what the budget has taken";
       coarse[k] += means;
       changes[k] += means != before[k];
       before[k] = means;

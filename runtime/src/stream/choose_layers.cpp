@@ -50,7 +50,8 @@ class Chooser {
     } else {
       addLayer(fade.frame, fade.to, weight, carried);
     }
-    shown_.coarse = shown_.coarse || fade.to > level_ || (fade.progress < 1 && fade.from > level_);
+    const std::uint32_t ideal = player_.ideal;
+    shown_.coarse = shown_.coarse || fade.to > ideal || (fade.progress < 1 && fade.from > ideal);
     if (fades_ < 2) next_[fades_++] = fade;
   }
 

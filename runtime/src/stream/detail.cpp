@@ -145,7 +145,8 @@ void Detail::choose(const Snapshot& snapshot, std::vector<PlannedClip>& clips, c
     State& state = stateOf(instance);
     const bool fresh = state.changed < 0;
     const std::uint32_t last = clip.clip->levelCount() - 1;
-    state.ideal = static_cast<std::uint8_t>(idealLevel(snapshot, instance, *clip.clip, state.ideal));
+    const std::uint8_t before = state.ideal;
+    state.ideal = static_cast<std::uint8_t>(idealLevel(snapshot, instance, *clip.clip, before));
     const Needed needed = neededNow(instance, *clip.clip);
     const auto finest = [&](double limit) {
       std::uint32_t level = state.ideal;
@@ -168,10 +169,12 @@ void Detail::choose(const Snapshot& snapshot, std::vector<PlannedClip>& clips, c
       if (state.ideal > level) level = state.ideal;
       if (level == state.level && snapshot.now - state.changed > 60) state.pause = kLevelPause;
     }
+    if (fresh || level != state.level || state.ideal != before) {
+      changes.push_back({.kind = Change::Kind::level, .item = level, .ideal = state.ideal, .instance = instance.id});
+    }
     if (fresh || level != state.level) {
       state.level = static_cast<std::uint8_t>(level);
       state.changed = std::max(snapshot.now, 0.0);
-      changes.push_back({.kind = Change::Kind::level, .item = level, .instance = instance.id});
     }
     ranked.level = level;
     if (level < last) taken += add(clip, needed, level, 2 * pass + 1, true);

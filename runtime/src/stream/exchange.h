@@ -73,12 +73,13 @@ struct Change {
     force,    // give it back though it is drawn, unless an instance has nothing else
     seize,    // give it back whatever it is drawn for
     discard,  // `frame` is of a clip that is closed
-    level,    // the instance is to be drawn at this level
+    level,    // the instance is to be drawn at this level, while the picture asks for `ideal`
     fail,     // the item will not come
     closed,   // nothing more comes for the clip's number
   } kind = Kind::arrive;
   std::uint32_t clip = 0;
   std::uint32_t item = 0;  // of `level`: the level
+  std::uint32_t ideal = 0;
   InstanceId instance = {};
   std::unique_ptr<ResidentFrame> frame = {};
 };

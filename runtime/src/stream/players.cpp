@@ -278,7 +278,10 @@ void Players::take(std::span<Change> changes, Transport& transport) {
     }
     if (change.kind == Change::Kind::level) {
       const std::uint32_t index = indexOf(change.instance);
-      if (index != format::kNone) players_[index].level = static_cast<std::uint8_t>(change.item);
+      if (index != format::kNone) {
+        players_[index].level = static_cast<std::uint8_t>(change.item);
+        players_[index].ideal = static_cast<std::uint8_t>(change.ideal);
+      }
       continue;
     }
     Track& track = tracks_[change.clip];

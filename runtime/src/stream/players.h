@@ -39,6 +39,7 @@ struct Player {
   double passed = 0;  // volume seconds since something of the moment was drawn, or since a seek
   std::uint32_t near = 0;
   std::uint8_t level = 0;  // that planning chose
+  std::uint8_t ideal = 0;  // that the picture's size asks for
 };
 
 // Decides what `view` draws at its phase. `moved`: volume seconds since the last time; `seconds`: real ones.
