@@ -78,6 +78,7 @@ struct FakeFrame {
 class FakeTransport final : public runtime::Transport {
  public:
   std::uint32_t latency = 1;
+  bool meansAreQuick = false;  // they take one
   std::uint32_t parallel = 4;
   // What is to become of a load, asked when it would arrive: an error, or nothing.
   std::function<std::optional<runtime::Error>(const runtime::LoadOrder&)> fault;
@@ -109,7 +110,8 @@ class FakeTransport final : public runtime::Transport {
   std::optional<runtime::LoadStage> stage(std::uint64_t ticket) const override {
     const auto found = loads_.find(ticket);
     if (found == loads_.end()) return std::nullopt;
-    return found->second.done >= latency ? runtime::LoadStage::waitingForMemory : runtime::LoadStage::reading;
+    return found->second.done >= latencyOf(found->second) ? runtime::LoadStage::waitingForMemory
+                                                          : runtime::LoadStage::reading;
   }
   void take(std::vector<runtime::Arrival>& arrivals) override {
     for (auto& arrival : arrivals_) arrivals.push_back(std::move(arrival));
@@ -129,8 +131,8 @@ class FakeTransport final : public runtime::Transport {
     std::uint32_t working = 0;
     for (auto at = loads_.begin(); at != loads_.end();) {
       Load& load = at->second;
-      if (working++ >= parallel && load.done < latency) break;
-      if (++load.done < latency || !arrive(load)) {
+      if (working++ >= parallel && load.done < latencyOf(load)) break;
+      if (++load.done < latencyOf(load) || !arrive(load)) {
         ++at;
         continue;
       }
@@ -177,6 +179,8 @@ class FakeTransport final : public runtime::Transport {
    private:
     std::size_t& count_;
   };
+
+  std::uint32_t latencyOf(const Load& load) const { return meansAreQuick && load.order.means ? 1 : latency; }
 
   bool arrive(const Load& load) {
     if (fault) {

@@ -1,7 +1,7 @@
 #!/bin/bash
 # The packs of the stream bench: stream_packs.sh BILLOW DATA OUT. DATA holds the project's larger test data. Writes
-# OUT/ember.blw (as `compile` does it) and ember_fast.blw (--compress fast), and hundred.blw: 100 frames, all sequences of DATA one after
-# the other and back again.
+# OUT/ember.blw (as `compile` does it), ember_fast.blw (--compress fast), ember_levels.blw (and --levels 2), and
+# hundred.blw: 100 frames, all sequences of DATA one after the other and back again.
 set -euo pipefail
 if [ $# -ne 3 ]; then
   echo "usage: stream_packs.sh BILLOW DATA OUT" >&2
@@ -11,6 +11,7 @@ billow=$1 data=$(realpath "$2") out=$3
 mkdir -p "$out"
 "$billow" compile "$data/ember" -o "$out/ember.blw" > "$out/ember.txt"
 "$billow" compile "$data/ember" --compress fast -o "$out/ember_fast.blw" > "$out/ember_fast.txt"
+"$billow" compile "$data/ember" --compress fast --levels 2 -o "$out/ember_levels.blw" > "$out/ember_levels.txt"
 
 frames=$(mktemp -d)
 trap 'rm -rf "$frames"' EXIT

@@ -136,10 +136,13 @@ class Stage {
 
 // Counts over updates and instances.
 struct Judged {
-  std::uint64_t shown = 0, full = 0, coarse = 0, held = 0, empty = 0;  // full: the wanted moment in all its detail
-  std::uint64_t moments = 0;                                           // frames of volumes that were newly wanted
-  std::vector<double> waitFrames, waitMs;  // from the update() that wanted a moment to the one that had it in full;
-  std::uint64_t unmet = 0;                 // of these, to the end, for it never came
+  std::uint64_t shown = 0;
+  std::uint64_t late = 0;     // nothing of the wanted moment: the last one is held, or there is none
+  std::uint64_t coarse = 0;   // the wanted moment, some of it coarser than the picture asks for
+  std::uint64_t moments = 0;  // frames of volumes that were newly wanted
+  // From the update() that wanted a moment to the one that drew it, or to the end where none did; and to the one that
+  // drew it, or a later one, in full detail.
+  std::vector<double> waitFrames, waitMs, fullFrames;
   std::vector<double> updateUs;
   std::uint64_t skipped = 0;  // ticks of the clock in which nothing was drawn, for the one before took too long
   double share(std::uint64_t count) const {
@@ -181,9 +184,8 @@ class Player {
       std::this_thread::sleep_until(tick);
     }
     for (Actor& actor : actors_) {
-      if (!actor.wantedAt) continue;
-      ++judged.unmet;
       met(actor, judged);
+      metInFull(actor, judged);
     }
     return judged;
   }
@@ -226,7 +228,7 @@ class Player {
     double time;  // seconds, not folded into the volume's
     runtime::Playback playback;
     std::optional<std::int64_t> moment = {};  // frame that should be shown, not folded
-    std::optional<std::uint64_t> wantedAt = {};
+    std::optional<std::uint64_t> wantedAt = {}, fullWantedAt = {};
     Clock::time_point wantedSince = {};
   };
 
@@ -243,8 +245,8 @@ class Player {
     stage_.draw(scene_, drawables_, streamer_.wait());
   }
 
-  // A moment that is not there in full when the next one is wanted goes on waiting: so long has there been nothing
-  // right to see.
+  // A moment that is not there when the next one is wanted goes on waiting: so long has there been nothing right to
+  // see.
   void judge(Actor& actor, const runtime::Drawable& drawable, Clock::time_point begin, Judged& judged) {
     actor.time += actor.playback.speed / kHertz;
     const auto moment = static_cast<std::int64_t>(std::floor(actor.time * scene_.framesPerSecond));
@@ -255,20 +257,29 @@ class Player {
         actor.wantedAt = updates_;
         actor.wantedSince = begin;
       }
+      if (!actor.fullWantedAt) actor.fullWantedAt = updates_;
     }
     ++judged.shown;
-    judged.empty += drawable.count == 0 ? 1 : 0;
-    judged.held += drawable.held ? 1 : 0;
+    if (drawable.count == 0 || drawable.held) {
+      ++judged.late;
+      return;
+    }
     judged.coarse += drawable.coarse ? 1 : 0;
-    if (!full(drawable)) return;
-    ++judged.full;
-    if (actor.wantedAt) met(actor, judged);
+    met(actor, judged);
+    if (!drawable.coarse) metInFull(actor, judged);
   }
 
   void met(Actor& actor, Judged& judged) const {
+    if (!actor.wantedAt) return;
     judged.waitFrames.push_back(static_cast<double>(updates_ - *actor.wantedAt));
     judged.waitMs.push_back(millisecondsSince(actor.wantedSince));
     actor.wantedAt.reset();
+  }
+
+  void metInFull(Actor& actor, Judged& judged) const {
+    if (!actor.fullWantedAt) return;
+    judged.fullFrames.push_back(static_cast<double>(updates_ - *actor.fullWantedAt));
+    actor.fullWantedAt.reset();
   }
 
   Stage& stage_;

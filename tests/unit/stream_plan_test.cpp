@@ -351,6 +351,51 @@ TEST_F(StreamPlan, AQuarterOfTheBudgetPlays) {
   }
 }
 
+// What is given back takes its memory for some updates yet, and what comes for some before it is drawn: where both do
+// not fit at a speed, all is drawn coarser instead of half of it late.
+TEST_F(StreamPlan, AFastLoopThatDoesNotFitIsCoarserButNeverLate) {
+  const PackFile file(sequencePack(12, evenBricks));
+  for (const double share : {0.35, 0.5, 0.6}) {
+    for (const double speed : {4.0, -4.0, 7.3}) {
+      for (const Loop loop : {Loop::loop, Loop::pingPong}) {
+        FakeStream stream({.gpuBudget = static_cast<std::uint64_t>(share * static_cast<double>(bytesOfAll(file)))});
+        stream.transport().parallel = 16;
+        const InstanceId id = add(stream, open(stream, file), {.speed = speed, .loop = loop});
+        stream.update(60, kTick);
+        int held = 0, turns = 0;
+        bool before = false;
+        for (int i = 0; i < 600; ++i) {
+          stream.update(kTick);
+          const Drawable drawable = stream->drawable(id);
+          expectSound(stream, drawable);
+          held += drawable.held;
+          turns += drawable.coarse != before;
+          before = drawable.coarse;
+        }
+        EXPECT_EQ(held, 0) << share << " of the frames at speed " << speed << ", loop " << static_cast<int>(loop);
+        EXPECT_LE(turns, 12) << share << " of the frames at speed " << speed << ", loop " << static_cast<int>(loop);
+      }
+    }
+  }
+}
+
+// A disk that cannot bring the full detail in time is no reason to hold.
+TEST_F(StreamPlan, WhatComesTooLateIsDrawnCoarserAfterAWhile) {
+  const PackFile file(sequencePack(120, evenBricks));
+  FakeStream stream({.gpuBudget = bytesOfAll(file) / 2});
+  stream.transport().parallel = 1;
+  stream.transport().latency = 4;
+  stream.transport().meansAreQuick = true;
+  const InstanceId id = add(stream, open(stream, file), {});
+  stream.update(240, kTick);
+  int held = 0;
+  for (int i = 0; i < 600; ++i) {
+    stream.update(kTick);
+    held += stream->drawable(id).held;
+  }
+  EXPECT_LT(held, 30);
+}
+
 TEST_F(StreamPlan, ASeekShowsTheNewMomentSoonAndHoldsTheOldUntilThen) {
   const PackFile file(sequencePack(48, evenBricks));
   FakeStream stream({.gpuBudget = bytesOfAll(file) / 4});

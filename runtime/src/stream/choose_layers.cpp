@@ -67,11 +67,13 @@ class Chooser {
   Fade fadeOf(std::uint32_t frame, std::uint32_t best) const {
     Fade fade{.frame = frame, .from = static_cast<std::uint8_t>(best), .to = static_cast<std::uint8_t>(best)};
     for (const Fade& known : player_.fades) {
-      if (known.frame == frame) fade = known;
+      if (known.frame != frame) continue;
+      fade = known;
+      fade.seen = std::min(fade.seen + seconds_, kFadeSeconds);
     }
     if (fade.to != best) turn(fade, best);
     if (fade.progress < 1) {
-      fade.progress = std::min(fade.progress + seconds_ / kFadeSeconds, 1.0f);
+      fade.progress = fade.length > seconds_ ? std::min(fade.progress + seconds_ / fade.length, 1.0f) : 1;
       if (!resident(frame, fade.from)) fade.progress = 1;
     }
     return fade;
@@ -86,6 +88,7 @@ class Chooser {
     // Of three levels at once the one that is drawn most goes on.
     if (fade.progress >= 0.5f || !resident(fade.frame, fade.from)) fade.from = fade.to;
     fade.to = static_cast<std::uint8_t>(best);
+    fade.length = fade.seen;
     fade.progress = 0;
   }
 

@@ -9,10 +9,15 @@ namespace {
 
 constexpr float kLevelPause = 1;     // seconds between changes of an instance's level to finer ones
 constexpr float kLongestPause = 16;  // where the budget takes the finer level back again and again
-constexpr double kFull = 0.9;        // of the budget, for what is drawn now and next
+constexpr double kFull = 0.95;       // of the budget, for what must be there at one time
 constexpr double kFinerOnlyBelow = 0.75;
-constexpr double kCoarserBelow = 0.8;  // pixels a voxel of the coarser level
-constexpr double kFinerAbove = 1.25;   // pixels a voxel of the present level
+constexpr double kCoarserBelow = 0.8;      // pixels a voxel of the coarser level
+constexpr double kFinerAbove = 1.25;       // pixels a voxel of the present level
+constexpr double kSettles = 0.5;           // seconds after a change of level in which its frames may still be coming
+constexpr double kStarved = 0.25;          // seconds without its level, of late, after which a coarser one is taken
+constexpr double kForgets = 0.25;          // of each second in which it was there
+constexpr double kLongestPass = 0.1;       // seconds between passes that are counted; a game may hang for more
+constexpr std::uint32_t kMostNeeded = 32;  // frames, each way
 
 // Distance along the view to the nearest of it, at least a voxel.
 double distanceTo(const View& view, const InstanceView& instance, double least) {
@@ -51,22 +56,6 @@ std::uint32_t idealLevel(const Snapshot& snapshot, const InstanceView& instance,
   return level;
 }
 
-// The frames that must be there for the instance to play: its moment's and the one after.
-struct Needed {
-  std::uint32_t frames[3];
-  std::uint32_t count = 0;
-};
-Needed neededNow(const InstanceView& instance, const Clip& clip) {
-  const Moment moment = momentAt(clip.timeline, instance.playback.loop, instance.phase, 0);
-  Needed needed;
-  needed.frames[needed.count++] = moment.a;
-  if (moment.b != moment.a) needed.frames[needed.count++] = moment.b;
-  if (instance.playback.speed == 0) return needed;
-  Walk walk(clip.timeline, instance.playback.loop, instance.phase, instance.playback.speed > 0);
-  if (walk.next()) needed.frames[needed.count++] = walk.forward() ? walk.b() : walk.a();
-  return needed;
-}
-
 }  // namespace
 
 double pixelsOf(const Snapshot& snapshot, const InstanceView& instance, double voxel) {
@@ -92,6 +81,48 @@ Detail::State& Detail::stateOf(const InstanceView& instance) {
   return state;
 }
 
+// The frames that must be there at one time for it to play on: of its moment, one more that comes at least, those that
+// come before a load that begins now would, and those that were drawn until just now. Each once.
+void Detail::gatherNeeded(const InstanceView& instance, const Clip& clip, const Pace& pace, Ranked& ranked) {
+  const auto begin = static_cast<std::ptrdiff_t>(needed_.size());
+  const auto add = [&](std::uint32_t frame) {
+    if (std::find(needed_.begin() + begin, needed_.end(), clip.same[frame]) != needed_.end()) return;
+    needed_.push_back(clip.same[frame]);
+  };
+  const Playback& playback = instance.playback;
+  const bool hold = playback.interpolation == Interpolation::hold;
+  const Moment moment = momentAt(clip.timeline, playback.loop, instance.phase, 0);
+  add(moment.a);
+  if (!hold) add(moment.b);
+  const double speed = std::abs(playback.speed);
+  for (const bool back : {false, true}) {
+    if (speed == 0) break;
+    Walk walk(clip.timeline, playback.loop, instance.phase, (playback.speed > 0) != back);
+    for (std::uint32_t i = 0; i < kMostNeeded && walk.next(); ++i) {
+      const bool always = !back && i == 0;
+      if (!always && walk.until() > (back ? pace.behind : pace.ahead) * speed) break;
+      add(hold || !walk.forward() ? walk.a() : walk.b());
+    }
+  }
+  ranked.firstNeeded = static_cast<std::uint32_t>(begin);
+  ranked.needed = static_cast<std::uint32_t>(needed_.size()) - ranked.firstNeeded;
+}
+
+// Whether its level does not come in time, though there is room for it.
+bool Detail::starves(const Snapshot& snapshot, const InstanceView& instance, const Clip& clip, State& state) const {
+  const double passed = std::clamp(snapshot.now - state.seen, 0.0, kLongestPass);
+  state.seen = snapshot.now;
+  bool missing = instance.held;
+  for (std::uint32_t i = 0; i < instance.drawnCount; ++i) {
+    missing = missing || clip.levelOf(instance.drawn[i]) > state.level;
+  }
+  if (instance.playback.speed == 0 || snapshot.now - state.changed < kSettles) missing = false;
+  state.starved = std::clamp(state.starved + (missing ? passed : -kForgets * passed), 0.0, 2 * kStarved);
+  if (state.starved < kStarved) return false;
+  state.starved = 0;
+  return true;
+}
+
 void Detail::rank(const Snapshot& snapshot) {
   ranked_.clear();
   for (std::uint32_t i = 0; i < snapshot.instances.size(); ++i) {
@@ -112,8 +143,9 @@ void Detail::rank(const Snapshot& snapshot) {
 }
 
 void Detail::choose(const Snapshot& snapshot, std::vector<PlannedClip>& clips, const Transport& transport,
-                    std::uint64_t pass, std::vector<Change>& changes) {
+                    const Pace& pace, std::uint64_t pass, std::vector<Change>& changes) {
   rank(snapshot);
+  needed_.clear();
   if (snapshot.gpuBudget > budget_) {
     for (State& state : states_) state.pause = kLevelPause;
   }
@@ -121,22 +153,23 @@ void Detail::choose(const Snapshot& snapshot, std::vector<PlannedClip>& clips, c
   const auto budget = static_cast<double>(snapshot.gpuBudget);
   double taken = 0;
   // What is counted once is marked: with an even number at its coarsest, with an odd one at the level that is chosen.
-  const auto add = [&](PlannedClip& clip, const Needed& needed, std::uint32_t level, std::uint64_t mark, bool keep) {
+  const auto add = [&](PlannedClip& clip, const Ranked& ranked, std::uint32_t level, std::uint64_t mark, bool keep) {
     double bytes = 0;
-    for (std::uint32_t i = 0; i < needed.count; ++i) {
-      const std::uint32_t item = clip.clip->item(needed.frames[i], level);
+    for (std::uint32_t i = 0; i < ranked.needed; ++i) {
+      const std::uint32_t item = clip.clip->item(needed_[ranked.firstNeeded + i], level);
       if (clip.items[item].marked >= mark) continue;
       bytes += static_cast<double>(bytesOf(transport, clip, item));
       if (keep) clip.items[item].marked = mark;
     }
     return bytes;
   };
-  for (const Ranked& ranked : ranked_) {
+  for (Ranked& ranked : ranked_) {
     const InstanceView& instance = snapshot.instances[ranked.instance];
     PlannedClip& clip = clips[instance.clip];
     if (clip.clip == nullptr) continue;
     const std::uint32_t last = clip.clip->levelCount() - 1;
-    taken += add(clip, neededNow(instance, *clip.clip), last, 2 * pass, true);
+    gatherNeeded(instance, *clip.clip, pace, ranked);
+    taken += add(clip, ranked, last, 2 * pass, true);
   }
   for (Ranked& ranked : ranked_) {
     const InstanceView& instance = snapshot.instances[ranked.instance];
@@ -147,16 +180,16 @@ void Detail::choose(const Snapshot& snapshot, std::vector<PlannedClip>& clips, c
     const std::uint32_t last = clip.clip->levelCount() - 1;
     const std::uint8_t before = state.ideal;
     state.ideal = static_cast<std::uint8_t>(idealLevel(snapshot, instance, *clip.clip, before));
-    const Needed needed = neededNow(instance, *clip.clip);
     const auto finest = [&](double limit) {
       std::uint32_t level = state.ideal;
-      while (level < last && taken + add(clip, needed, level, 2 * pass + (level == last ? 0 : 1), false) > limit) {
+      while (level < last && taken + add(clip, ranked, level, 2 * pass + (level == last ? 0 : 1), false) > limit) {
         ++level;
       }
       return level;
     };
-    const std::uint32_t fitting = finest(kFull * budget);
+    std::uint32_t fitting = finest(kFull * budget);
     std::uint32_t level = std::min<std::uint32_t>(state.level, last);
+    if (starves(snapshot, instance, *clip.clip, state)) fitting = std::max(fitting, std::min(level + 1, last));
     if (fresh || fitting > level) {
       // Taken back soon after it was given: the next try waits for longer.
       if (!fresh && snapshot.now - state.changed < 4.0 * static_cast<double>(state.pause)) {
@@ -177,7 +210,7 @@ void Detail::choose(const Snapshot& snapshot, std::vector<PlannedClip>& clips, c
       state.changed = std::max(snapshot.now, 0.0);
     }
     ranked.level = level;
-    if (level < last) taken += add(clip, needed, level, 2 * pass + 1, true);
+    if (level < last) taken += add(clip, ranked, level, 2 * pass + 1, true);
   }
 }
 

@@ -44,18 +44,27 @@ struct PlannedClip {
 // The bytes of an item on the device, asked of the transport where they are not known yet.
 std::uint64_t bytesOf(const Transport& transport, PlannedClip& clip, std::uint32_t item);
 
+// How long frames take room beside those that are drawn, in real seconds.
+struct Pace {
+  double ahead = 0;   // from the order of a load to the update() that can draw it
+  double behind = 0;  // from the last update() that draws a frame until its memory is free
+};
+
 class Detail {
  public:
   struct Ranked {
     std::uint32_t instance = 0;  // in the snapshot
     std::uint32_t level = 0;
     float importance = 0;
+    std::uint32_t firstNeeded = 0, needed = 0;  // of needed_
   };
 
-  // Ranks instances by importance and chooses levels, which change seldom: at most one change in kLevelPause seconds
-  // to finer ones. Marks items with `pass`. Appends Change::level where one changes.
-  void choose(const Snapshot& snapshot, std::vector<PlannedClip>& clips, const Transport& transport, std::uint64_t pass,
-              std::vector<Change>& changes);
+  // Ranks instances by importance and chooses levels: of the finest that the picture's size asks for, the first of
+  // which the frames that are drawn, come in time and are not given back yet all fit into the budget; or a coarser one,
+  // for a while, where frames still come too late. Levels change seldom: at most once in kLevelPause seconds to finer
+  // ones. Marks items with `pass`. Appends Change::level where one changes.
+  void choose(const Snapshot& snapshot, std::vector<PlannedClip>& clips, const Transport& transport, const Pace& pace,
+              std::uint64_t pass, std::vector<Change>& changes);
   // By importance, of instances with priority.
   const std::vector<Ranked>& ranked() const { return ranked_; }
 
@@ -66,13 +75,18 @@ class Detail {
     std::uint8_t ideal = 0;
     float pause = 1;        // seconds until it may become finer again
     double changed = -1e9;  // when it changed
+    double seen = 0;        // when the pass before was
+    double starved = 0;     // seconds of late in which its level was not there to be drawn
   };
   State& stateOf(const InstanceView& instance);
   void rank(const Snapshot& snapshot);
+  void gatherNeeded(const InstanceView& instance, const Clip& clip, const Pace& pace, Ranked& ranked);
+  bool starves(const Snapshot& snapshot, const InstanceView& instance, const Clip& clip, State& state) const;
 
   std::uint64_t budget_ = 0;   // of the pass before
   std::vector<State> states_;  // by handle slot
-  std::vector<Ranked> ranked_, unsorted_;
+  std::vector<Ranked> ranked_;
+  std::vector<std::uint32_t> needed_;  // frames, of one instance after the other
 };
 
 inline constexpr std::uint32_t kHandleSlotBits = 20;  // of an InstanceId; the rest counts the slot's uses

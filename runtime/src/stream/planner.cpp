@@ -3,6 +3,12 @@
 #include <algorithm>
 
 namespace billow::runtime {
+namespace {
+
+constexpr double kLongestUpdate = 0.1;  // seconds; a game that hangs is no slower
+
+}  // namespace
+
 void Planner::pass(Snapshot& snapshot, std::vector<Change>& changes, std::vector<StreamError>& errors) {
   ++passes_;
   update_ = snapshot.update;
@@ -13,7 +19,7 @@ void Planner::pass(Snapshot& snapshot, std::vector<Change>& changes, std::vector
   markDrawn(snapshot);
   measureSlack();
   findVelocity(snapshot);
-  detail_.choose(snapshot, clips_, transport_, passes_, changes);
+  detail_.choose(snapshot, clips_, transport_, pace(snapshot), passes_, changes);
   gather(snapshot);
   fit();
   cancelUnwanted(snapshot.now);
@@ -22,6 +28,18 @@ void Planner::pass(Snapshot& snapshot, std::vector<Change>& changes, std::vector
   order(snapshot);
   forceRoom(snapshot, changes);
   count(snapshot.now);
+}
+
+Pace Planner::pace(const Snapshot& snapshot) {
+  if (snapshot.update > paceUpdate_) {
+    const double passed = (snapshot.now - paceNow_) / static_cast<double>(snapshot.update - paceUpdate_);
+    updateSeconds_ += 0.1 * (std::clamp(passed, 0.0, kLongestUpdate) - updateSeconds_);
+    paceNow_ = snapshot.now;
+    paceUpdate_ = snapshot.update;
+  }
+  // What has arrived waits for an update().
+  return {.ahead = std::min(quickest_.value_or(0), kLongestLatency) + updateSeconds_,
+          .behind = config_.framesInFlight * updateSeconds_};
 }
 
 void Planner::findVelocity(const Snapshot& snapshot) {
@@ -96,7 +114,8 @@ bool Planner::submit(const Want& want, std::uint64_t bytes, double now) {
                     .item = want.item,
                     .since = now,
                     .bytes = bytes,
-                    .velocity = clip.velocity});
+                    .velocity = clip.velocity,
+                    .waited = false});
   return true;
 }
 
@@ -126,8 +145,9 @@ void Planner::count(double now) {
   stats_.framesResident = static_cast<std::uint32_t>(residents_.size());
   stats_.loadsQueued = stats_.loadsReading = stats_.loadsDecoding = stats_.loadsUploading = 0;
   stats_.missingBricks = {};
-  for (const Load& load : loads_) {
+  for (Load& load : loads_) {
     const LoadStage stage = transport_.stage(load.ticket).value_or(LoadStage::uploading);
+    load.waited = load.waited || stage == LoadStage::waitingForMemory;
     if (stage == LoadStage::reading) ++stats_.loadsReading;
     if (stage == LoadStage::decoding) ++stats_.loadsDecoding;
     if (stage == LoadStage::waitingForMemory || stage == LoadStage::uploading) ++stats_.loadsUploading;

@@ -25,6 +25,9 @@ namespace billow::runtime {
 // wait for long.
 inline constexpr std::size_t kMostLoads = 16;
 
+// Longest time in seconds that a load is thought to take: what takes longer is fetched in order all the same.
+inline constexpr double kLongestLatency = 2;
+
 class Planner {
  public:
   Planner(Transport& transport, const StreamConfig& config) : transport_(transport), config_(config) {}
@@ -55,6 +58,7 @@ class Planner {
     double since;
     std::uint64_t bytes;  // at most, on the device
     bool velocity;
+    bool waited;  // for memory
   };
   struct Leaving {
     std::uint64_t update;
@@ -101,6 +105,7 @@ class Planner {
   void evict(std::uint32_t clip, std::uint32_t item, Change::Kind kind, std::vector<Change>& changes);
 
   // planner.cpp: what is ordered
+  Pace pace(const Snapshot& snapshot);
   void findVelocity(const Snapshot& snapshot);
   void fit();
   bool absent(const Want& want, double now) const;
@@ -130,7 +135,11 @@ class Planner {
   std::uint64_t resident_ = 0;               // bytes, without what the frame thread was asked to give back
   std::uint64_t asked_ = 0;                  // bytes of that
   std::uint64_t loading_ = 0;
-  double latency_ = 0;                        // seconds from order to arrival, of late
+  double latency_ = 0;              // seconds from order to arrival, of late
+  std::optional<double> quickest_;  // and of those that waited least
+  double paceNow_ = 0;              // of the snapshot from which the pace was measured last
+  std::uint64_t paceUpdate_ = 0;
+  double updateSeconds_ = 1.0 / 60;           // from one update() to the next, of late
   std::optional<std::uint64_t> blockedFrom_;  // the update since which something of now has no room
   bool lost_ = false;
   PlanStats stats_;

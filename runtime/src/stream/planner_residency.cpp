@@ -119,7 +119,9 @@ void Planner::takeArrivals(double now, std::vector<Change>& changes, std::vector
     loads_.pop_back();
     loading_ -= load.bytes;
     clips_[load.clip].items[load.item].ticket = 0;
-    latency_ += 0.25 * (now - load.since - latency_);
+    const double took = now - load.since;
+    latency_ += 0.25 * (took - latency_);
+    if (!load.waited) quickest_ = std::min(took, quickest_.value_or(took) + 0.05 * took);
     if (arrival.frame) {
       arrived(load, arrival, changes);
     } else {

@@ -4,12 +4,6 @@
 #include "planner.h"
 
 namespace billow::runtime {
-namespace {
-
-// Longest time that a load is thought to take: what takes longer is fetched in order all the same.
-constexpr double kLongestLatency = 2;
-
-}  // namespace
 
 bool Planner::anyLevel(const PlannedClip& clip, std::uint32_t frame) const {
   const std::uint32_t levels = clip.clip->levelCount();

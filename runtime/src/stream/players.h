@@ -13,7 +13,8 @@
 
 namespace billow::runtime {
 
-inline constexpr float kFadeSeconds = 0.2f;  // from a level of detail to another
+// From a level of detail to another at most: what was seen for less, as after a seek, goes as fast as it came.
+inline constexpr float kFadeSeconds = 0.2f;
 
 // The frames of a clip that are resident, by item.
 struct Track {
@@ -31,6 +32,8 @@ struct Fade {
   std::uint32_t frame = format::kNone;
   std::uint8_t from = 0, to = 0;
   float progress = 1;
+  float length = 0;  // seconds of the fade
+  float seen = 0;    // seconds since it was drawn first
 };
 
 // What an instance remembers from update to update.
