@@ -119,6 +119,8 @@ class FakeTransport final : public runtime::Transport {
   }
   std::uint64_t wantedGpuBytes() const override { return wanted_; }
   bool mustLeave(const runtime::ResidentFrame&) const override { return false; }
+  bool admit(const runtime::ResidentFrame&) override { return true; }
+  void stop() override {}
 
   void update() override {
     ++updates_;

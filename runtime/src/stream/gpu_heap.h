@@ -46,6 +46,7 @@ class HeapMemory final : public FrameMemory {
   Part buffer, atlas;  // without a block where the frame has none
   VkImage image = VK_NULL_HANDLE;
   VkImageView view = VK_NULL_HANDLE;
+  std::uint64_t batch = 0;  // the last one of the Uploader that writes it
 
  private:
   GpuHeap& heap_;

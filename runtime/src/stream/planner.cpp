@@ -105,6 +105,7 @@ bool Planner::submit(const Want& want, std::uint64_t bytes, double now) {
   Item& item = clip.items[want.item];
   LoadOrder order = clip.clip->order(want.item, clip.velocity);
   order.ticket = nextTicket_;
+  order.urgent = want.tier <= kNow;
   item.scratch = !transport_.submit(order);
   if (item.scratch) return false;
   item.ticket = nextTicket_++;

@@ -101,9 +101,13 @@ void Planner::closeClip(std::uint32_t number) {
 }
 
 void Planner::takeArrivals(double now, std::vector<Change>& changes, std::vector<StreamError>& errors) {
-  arrivals_.clear();
   transport_.take(arrivals_);
-  for (Arrival& arrival : arrivals_) {
+  // Where memory is short here, they are still there in the next pass: the device may be writing the frames.
+  changes.reserve(changes.size() + arrivals_.size());
+  leaving_.reserve(leaving_.size() + 2 * arrivals_.size());
+  while (!arrivals_.empty()) {
+    Arrival arrival = std::move(arrivals_.back());
+    arrivals_.pop_back();
     const auto found =
         std::find_if(loads_.begin(), loads_.end(), [&](const Load& load) { return load.ticket == arrival.ticket; });
     if (found == loads_.end()) {

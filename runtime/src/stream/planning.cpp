@@ -31,6 +31,9 @@ void Planning::stop() {
   }
   asked_.notify_all();
   if (thread_.joinable()) thread_.join();
+}
+
+void Planning::clear() {
   const std::lock_guard lock(mutex_);
   planner_.reset();
   snapshot_ = pending_ = {};
@@ -87,7 +90,8 @@ void Planning::pass() {
 void Planning::take(std::vector<Change>& changes, std::vector<StreamError>& errors, PlanStats& stats) {
   const std::unique_lock lock(mutex_, std::try_to_lock);
   if (!lock) return;
-  changes.swap(changes_);
+  // What could not be used the last time goes first.
+  moveOver(changes_, changes);
   errors.swap(errors_);
   stats = stats_;
 }

@@ -27,8 +27,10 @@ class Planning {
   ~Planning() { stop(); }
 
   void start(Transport& transport, const StreamConfig& config);
-  // Waits for the pass that is being made. What has not been taken is gone, frames too.
+  // Waits for the pass that is being made.
   void stop();
+  // After stop(): what has not been taken is gone, frames too.
+  void clear();
 
   // From any thread: a pass is made soon after. Short, and no call into the transport with PlanOn::thread.
   void request();

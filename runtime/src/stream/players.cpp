@@ -270,8 +270,10 @@ bool Players::isLast(std::uint32_t clip, std::uint32_t item) const {
   return false;
 }
 
-void Players::take(std::span<Change> changes, Transport& transport) {
-  for (Change& change : changes) {
+std::size_t Players::take(std::span<Change> changes, Transport& transport) {
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    Change& change = changes[i];
+    if (change.kind == Change::Kind::arrive && !transport.admit(*change.frame)) return i;
     if (change.kind == Change::Kind::discard) {
       transport.retire(std::move(change.frame));
       continue;
@@ -323,6 +325,7 @@ void Players::take(std::span<Change> changes, Transport& transport) {
         break;
     }
   }
+  return changes.size();
 }
 
 void Players::advance(double seconds, std::uint64_t update) {

@@ -87,7 +87,8 @@ class Players {
   bool successorFailed(AssetId asset) const;
 
   // The parts of an update(), in this order.
-  void take(std::span<Change> changes, Transport& transport);
+  // Gives how many of the changes it took: what follows a frame that may not be drawn yet waits with it.
+  std::size_t take(std::span<Change> changes, Transport& transport);
   void advance(double seconds, std::uint64_t update);
   void giveBack(Transport& transport, std::uint64_t update);
   void fill(Snapshot& snapshot);

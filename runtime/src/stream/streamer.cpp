@@ -332,8 +332,8 @@ class StreamerImpl final : public Streamer {
     if (transport_ == nullptr) return players_.advance(seconds, stats_.updates);
     transport_->update();
     planning_.take(changes_, met_, plan_);
-    players_.take(changes_, *transport_);
-    changes_.clear();
+    const std::size_t taken = players_.take(changes_, *transport_);
+    changes_.erase(changes_.begin(), changes_.begin() + static_cast<std::ptrdiff_t>(taken));
     takeErrors();
     takeOpened();
     finishReloads(seconds);
@@ -421,6 +421,8 @@ class StreamerImpl final : public Streamer {
     openings_.stop();
     takeOpened();
     planning_.stop();
+    transport_->stop();
+    planning_.clear();
     changes_.clear();
     met_.clear();
     snapshot_ = {};

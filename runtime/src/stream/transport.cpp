@@ -205,7 +205,7 @@ void TransportCore::take(std::vector<Arrival>& arrivals) {
       arrival.frame = tl::unexpected(std::move(*load.error));
       if (load.frame != nullptr) kept_.push_back(std::move(load.frame));
     } else {
-      taken_ = std::max<std::uint64_t>(taken_, load.upload.batch);
+      if (load.upload.batch <= executed_) taken_ = std::max<std::uint64_t>(taken_, load.upload.batch);
       arrival.frame = std::move(load.frame);
     }
     tickets_.erase(load.order.ticket);
@@ -215,6 +215,16 @@ void TransportCore::take(std::vector<Arrival>& arrivals) {
 
 bool TransportCore::mustLeave(const ResidentFrame& frame) const {
   return frame.memory_ != nullptr && heap_.leaving(static_cast<const HeapMemory&>(*frame.memory_));
+}
+
+bool TransportCore::admit(const ResidentFrame& frame) {
+  if (frame.memory_ == nullptr) return true;
+  const std::uint64_t batch = static_cast<const HeapMemory&>(*frame.memory_).batch;
+  if (batch > uploader_.submitted()) return false;
+  std::uint64_t taken = taken_;
+  while (taken < batch && !taken_.compare_exchange_weak(taken, batch)) {
+  }
+  return true;
 }
 
 void TransportCore::retire(std::unique_ptr<ResidentFrame> frame) {
@@ -232,7 +242,7 @@ void TransportCore::update() {
       buried_.push_back(std::move(retired.frame));
       return true;
     });
-    any = !buried_.empty();
+    any = !buried_.empty() || diesLater_;
   }
   if (config_.submission == Submission::inUpdate) submitBatches();
   progress();

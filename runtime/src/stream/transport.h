@@ -28,13 +28,17 @@ struct LoadOrder {
   std::uint32_t volume = 0, frame = 0;
   GridChoice grids = {};
   bool means = false;  // the frame of Node3 means in place of the frame
+  // It arrives once its upload is recorded, for draws to wait on the device until it is executed; else when it has
+  // been.
+  bool urgent = false;
 };
 
 enum class LoadStage { reading, decoding, waitingForMemory, uploading };
 
 struct Arrival {
   std::uint64_t ticket = 0;
-  // Complete on the device. Errors: ErrorCode::pack and memory are this frame's; vulkan is the device's.
+  // Complete on the device, but for urgent loads: see admit(). Errors: ErrorCode::pack and memory are this frame's;
+  // vulkan is the device's.
   Result<std::unique_ptr<ResidentFrame>> frame;
   std::optional<std::uint32_t> page = {};  // that the error is about
 };
@@ -50,14 +54,16 @@ struct Wake {
   void* user = nullptr;
 };
 
-// submit(), cancel(), stage(), take() and wanted() are called by the planner, one thread at a time; update(), retire()
-// and wait() by the frame thread; all may run at the same time.
+// submit(), cancel(), stage(), take() and wanted() are called by the planner, one thread at a time; update(), admit(),
+// retire() and wait() by the frame thread; all may run at the same time.
 class Transport {
  public:
   static Result<std::unique_ptr<Transport>> create(Device& device, const StreamConfig& config, const Wake& wake);
-  // Waits for own threads, jobs that the host's system has begun, reads in flight, and the uploads that were submitted
-  // (some seconds at most). Frames must be gone before, save for those that were retired.
+  // As stop(). Frames must be gone before, save for those that were retired.
   virtual ~Transport() = default;
+  // Nothing goes on: waits for own threads, jobs that the host's system has begun, reads in flight, and the uploads
+  // that were submitted (some seconds at most). From then on frames may be destroyed.
+  virtual void stop() = 0;
 
   // Most device bytes that the frame takes, alignment included, and most scratch on the CPU: from the tables alone.
   struct Cost {
@@ -83,6 +89,9 @@ class Transport {
   // On the frame thread, once an update(): counts it, frees what was retired framesInFlight updates ago, and submits
   // uploads where Submission is inUpdate. Never waits.
   virtual void update() = 0;
+  // Whether the frame may be drawn: its upload has been submitted, and wait() covers it. If not, ask after the next
+  // update().
+  virtual bool admit(const ResidentFrame& frame) = 0;
   // The frame is not drawn from now on.
   virtual void retire(std::unique_ptr<ResidentFrame> frame) = 0;
   virtual UploadWait wait() const = 0;

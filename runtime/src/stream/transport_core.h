@@ -55,7 +55,8 @@ struct Load {
 class TransportCore final : public Transport {
  public:
   TransportCore(Device& device, const StreamConfig& config, const Wake& wake);
-  ~TransportCore() override;
+  ~TransportCore() override { stop(); }
+  void stop() override;
   Result<void> create();
 
   Cost cost(const LoadOrder& order) const override;
@@ -66,6 +67,7 @@ class TransportCore final : public Transport {
   std::uint64_t wantedGpuBytes() const override { return wanted_; }
   bool mustLeave(const ResidentFrame& frame) const override;
   void update() override;
+  bool admit(const ResidentFrame& frame) override;
   void retire(std::unique_ptr<ResidentFrame> frame) override;
   UploadWait wait() const override { return {uploader_.semaphore(), taken_}; }
   void setBudget(std::uint64_t gpuBytes, std::uint64_t cpuBytes) override;
@@ -90,6 +92,7 @@ class TransportCore final : public Transport {
 
   Plan plan(const LoadOrder& order) const;
   Load* first(Step step);
+  bool executed(const ResidentFrame& frame) const;
   void add(const LoadOrder& order, Plan& plan, std::optional<Error> error);
 
   // Jobs; `core` is this.
@@ -130,11 +133,12 @@ class TransportCore final : public Transport {
   std::unordered_map<std::uint64_t, Load*> tickets_;
   std::uint64_t submitted_ = 0;
   std::vector<Retired> retired_;
-  std::vector<std::unique_ptr<ResidentFrame>> buried_;  // nothing reads them any more
+  std::vector<std::unique_ptr<ResidentFrame>> buried_;  // nothing reads them any more; some may still be written
   std::vector<std::unique_ptr<ResidentFrame>> kept_;    // of loads that failed with the device, until the end
   std::optional<Error> failure_;                        // the device's
   std::uint64_t updates_ = 0;
-  bool refused_ = false;  // submit() gave false, and the planner waits for room
+  bool diesLater_ = false;  // loads that end are still written
+  bool refused_ = false;    // submit() gave false, and the planner waits for room
 
   std::atomic<bool> broken_ = false;  // failure_ is set
   SingleFlight pumping_;

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <utility>
 
 #include "billow/format/rule.h"
@@ -47,7 +48,7 @@ Result<void> TransportCore::create() {
   return {};
 }
 
-TransportCore::~TransportCore() {
+void TransportCore::stop() {
   {
     const std::lock_guard lock(submitMutex_);
     stopping_ = true;
@@ -61,10 +62,6 @@ TransportCore::~TransportCore() {
   jobs_.stop();
   readsInFlight_.waitForNone();
   uploader_.finish();
-  loads_.clear();
-  retired_.clear();
-  buried_.clear();
-  kept_.clear();
 }
 
 void TransportCore::wake() const {
@@ -227,6 +224,7 @@ void TransportCore::pump(void* context) {
     // The load stays where it is, and is tried again when anything else has moved.
   }
   if (auto closed = core.uploader_.close(); !closed) core.fail(closed.error());
+  core.progress();
   core.countWanted();
   if (core.pumping_.again() && !core.post(&pump)) core.pumping_.drop();
 }
@@ -318,9 +316,17 @@ void TransportCore::bury(void* context) {
   decltype(core.loads_) gone(core.loads_.get_allocator());  // destroyed without the lock
   {
     const std::lock_guard lock(core.mutex_);
-    frames.swap(core.buried_);
+    const auto written = [&](const auto& frame) { return !core.executed(*frame); };
+    const auto done = std::stable_partition(core.buried_.begin(), core.buried_.end(), written);
+    std::move(done, core.buried_.end(), std::back_inserter(frames));
+    core.buried_.erase(done, core.buried_.end());
+    core.diesLater_ = false;
     for (auto it = core.loads_.begin(); it != core.loads_.end();) {
-      if (it->second.step != Step::dying) {
+      const bool dying = it->second.step == Step::dying;
+      // It had arrived before the device was done with it.
+      const bool later = dying && it->second.frame != nullptr && !core.failure_ && written(it->second.frame);
+      core.diesLater_ = core.diesLater_ || later;
+      if (!dying || later) {
         ++it;
         continue;
       }
@@ -344,9 +350,14 @@ void TransportCore::land(Load& load) {
   share_.giveBack(std::exchange(load.promised, 0));
   load.error = failure_;
   load.step = load.cancelled ? Step::dying : Step::arrived;
+  static_cast<HeapMemory&>(*load.frame->memory_).batch = load.upload.batch;
 }
 
-// Takes in what the device has executed.
+bool TransportCore::executed(const ResidentFrame& frame) const {
+  return frame.memory_ == nullptr || static_cast<const HeapMemory&>(*frame.memory_).batch <= executed_;
+}
+
+// Takes in what the device has executed, and what is urgent as soon as it is recorded.
 void TransportCore::progress() {
   if (broken_) return;
   const auto done = uploader_.completed();
@@ -356,7 +367,9 @@ void TransportCore::progress() {
   {
     const std::lock_guard lock(mutex_);
     for (auto& [number, load] : loads_) {
-      if (load.step != Step::flying || load.upload.batch > *done) continue;
+      if (load.step != Step::flying) continue;
+      const bool soon = load.order.urgent && !load.cancelled;
+      if (load.upload.batch > (soon ? uploader_.closed() : *done)) continue;
       any = true;
       dead = dead || load.cancelled;
       land(load);

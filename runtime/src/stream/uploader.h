@@ -52,6 +52,7 @@ class Uploader {
   std::uint64_t seen() const { return seen_; }
   // The last batch that the device has executed. Errors: vulkan.
   Result<std::uint64_t> completed() const;
+  std::uint64_t closed() const { return closed_; }
   std::uint64_t submitted() const { return submitted_; }
   VkSemaphore semaphore() const { return semaphore_; }
   // The atlas of frames that have none: one texel.

@@ -187,7 +187,8 @@ struct StreamError {
   std::string message = {};  // one line: what, where, why, and what still plays
 };
 
-// What the submission that draws must wait for; the device has reached it already or soon will.
+// What the submission that draws must wait for, on the device. It has been submitted; mostly it has been reached too,
+// but what was urgent is drawn in the update() that submits it.
 struct UploadWait {
   VkSemaphore semaphore = VK_NULL_HANDLE;
   std::uint64_t value = 0;
