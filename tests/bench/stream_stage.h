@@ -193,12 +193,17 @@ class Player {
     return play(seconds, paced, [](std::uint64_t) {});
   }
 
-  // Until everything that is wanted is shown in full; false after `seconds`.
-  bool settle(double seconds) {
-    return until(seconds, [&] {
-      return std::all_of(actors_.begin(), actors_.end(),
-                         [&](const Actor& actor) { return full(streamer_.drawable(actor.id)); });
-    });
+  // Plays on until everything that is wanted is shown, a second at least and at most `seconds`: how fast a game updates
+  // is part of what planning goes by.
+  void settle(double seconds) {
+    for (const Clock::time_point begin = Clock::now(); millisecondsSince(begin) < seconds * 1e3;) {
+      play(1);
+      const auto shown = [&](const Actor& actor) {
+        const runtime::Drawable drawable = streamer_.drawable(actor.id);
+        return drawable.count != 0 && !drawable.held;
+      };
+      if (std::all_of(actors_.begin(), actors_.end(), shown)) return;
+    }
   }
 
   // The game goes on, with as many updates as there is time for and `pause` microseconds between them, until `done()`;

@@ -33,7 +33,7 @@ void Planner::pass(Snapshot& snapshot, std::vector<Change>& changes, std::vector
 Pace Planner::pace(const Snapshot& snapshot) {
   if (snapshot.update > paceUpdate_) {
     const double passed = (snapshot.now - paceNow_) / static_cast<double>(snapshot.update - paceUpdate_);
-    updateSeconds_ += 0.1 * (std::clamp(passed, 0.0, kLongestUpdate) - updateSeconds_);
+    updateSeconds_ += 0.25 * (std::clamp(passed, 0.0, kLongestUpdate) - updateSeconds_);
     paceNow_ = snapshot.now;
     paceUpdate_ = snapshot.update;
   }
