@@ -55,6 +55,7 @@ class Soak {
     std::unique_ptr<Painter::Pending> pending;
     std::vector<std::size_t> contents;
     std::vector<std::uint32_t> frames;
+    std::optional<std::uint32_t> other;  // that may be drawn in place of the one
     std::vector<float> weights;
     std::vector<std::uint32_t> bricks;  // of the frames that are drawn
     std::string what;                   // for whom it may concern
@@ -111,7 +112,8 @@ class Soak {
   void checkLayers(const runtime::Drawable& drawable) const;
   void takeSnapshot();
   void finishSnapshot();
-  std::vector<float> reference(std::size_t content, const Snapshot& snapshot);
+  std::vector<float> reference(std::size_t content, const Snapshot& snapshot,
+                               const std::vector<std::uint32_t>& numbers);
   [[noreturn]] void fail(const std::string& what) const;
   void require(bool holds, const char* what) const {
     if (!holds) fail(what);

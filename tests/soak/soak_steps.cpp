@@ -35,7 +35,7 @@ void Soak::step() {
                                     {15, &Soak::squeeze, "squeeze"},       {60, &Soak::setFaults, "faults"},
                                     {60, &Soak::clearFaults, "no faults"}, {5, &Soak::loseDevice, "device lost"},
                                     {5, &Soak::reattach, "attach"},        {15, &Soak::drain, "drain"},
-                                    {30, &Soak::takeSnapshot, "picture"},  {60, &Soak::nonsense, "nonsense"}};
+                                    {150, &Soak::takeSnapshot, "picture"}, {60, &Soak::nonsense, "nonsense"}};
   std::uint32_t sum = 0;
   for (const Kind& kind : kKinds) sum += kind.weight;
   std::uint32_t at = below(sum);
@@ -303,6 +303,9 @@ void Soak::loseDevice() {
 
 void Soak::reattach() {
   finishSnapshot();
+  // detach() waits for reads in flight.
+  if (stalled_) disk_->setFaults({});
+  stalled_ = false;
   if (attached_) {
     // The device was not lost in truth: what it still does must end before its objects go.
     device_->vk.vkDeviceWaitIdle(device_->host.device);

@@ -12,6 +12,8 @@
 #ifndef BILLOW_RUNTIME_STREAM_PLANNER_H
 #define BILLOW_RUNTIME_STREAM_PLANNER_H
 
+#include <map>
+#include <memory>
 #include <set>
 #include <utility>
 #include <vector>
@@ -28,9 +30,23 @@ inline constexpr std::size_t kMostLoads = 16;
 // Longest time in seconds that a load is thought to take: what takes longer is fetched in order all the same.
 inline constexpr double kLongestLatency = 2;
 
+// Pages of open packs whose errors the host knows. It outlives planners, which come and go with devices.
+class ToldPages {
+ public:
+  // Whether it is the first time: that a page cannot be read does not hide that it is damaged.
+  bool insert(const std::shared_ptr<OpenPack>& pack, std::uint32_t page, bool damaged) {
+    return told_[pack].insert({page, damaged}).second;
+  }
+  void forget(const std::shared_ptr<OpenPack>& pack) { told_.erase(pack); }
+
+ private:
+  std::map<std::weak_ptr<const OpenPack>, std::set<std::pair<std::uint32_t, bool>>, std::owner_less<>> told_;
+};
+
 class Planner {
  public:
-  Planner(Transport& transport, const StreamConfig& config) : transport_(transport), config_(config) {}
+  Planner(Transport& transport, const StreamConfig& config, ToldPages& told)
+      : transport_(transport), config_(config), told_(told) {}
 
   void pass(Snapshot& snapshot, std::vector<Change>& changes, std::vector<StreamError>& errors);
   const PlanStats& stats() const { return stats_; }
@@ -125,7 +141,7 @@ class Planner {
   std::vector<Victim> victims_;
   std::vector<Leaving> leaving_;  // retired; the device may still read them
   std::vector<Arrival> arrivals_;
-  std::set<std::pair<const OpenPack*, std::uint32_t>> toldPages_;  // errors that the host knows
+  ToldPages& told_;
   std::uint64_t passes_ = 0;
   std::uint64_t update_ = 0;  // of the snapshot
   std::uint64_t nextTicket_ = 1;

@@ -95,8 +95,7 @@ void Planner::closeClip(std::uint32_t number) {
     loading_ -= load.bytes;
     return true;
   });
-  const OpenPack* const pack = clip.clip->pack.get();
-  toldPages_.erase(toldPages_.lower_bound({pack, 0}), toldPages_.upper_bound({pack, format::kNone}));
+  told_.forget(clip.clip->pack);
   clip = {};
 }
 
@@ -169,10 +168,7 @@ void Planner::failed(const Load& load, const Arrival& arrival, double now, std::
     changes.push_back({.kind = Change::Kind::fail, .clip = load.clip, .item = load.item});
   }
   if (!tell) return;
-  // That it cannot be read does not hide that it is damaged.
-  if (arrival.page) {
-    if (!toldPages_.insert({clip.pack.get(), *arrival.page << 1 | (item.corrupt ? 1u : 0u)}).second) return;
-  }
+  if (arrival.page && !told_.insert(clip.pack, *arrival.page, item.corrupt)) return;
   const char* const then = lost_          ? "; nothing more is loaded until there is a new device"
                            : item.corrupt ? "; all else plays on"
                                           : "; it will be tried again";

@@ -114,7 +114,8 @@ void Planner::leaveBlocks(const Snapshot& snapshot, std::vector<Change>& changes
     if (item.moving && !late) continue;
     evict(resident.clip, resident.item, late ? Change::Kind::seize : Change::Kind::evict, changes);
   }
-  if (!found && snapshot.update > *shrunkFrom_) shrunkFrom_.reset();
+  // What was on its way when the budget shrank may lie in such memory too.
+  if (!found && snapshot.update > *shrunkFrom_ && transport_.stats().gpuAllocated <= budget_) shrunkFrom_.reset();
 }
 
 // Frames are of all sizes, and the gaps between them are not always where they are needed.

@@ -16,7 +16,7 @@ void moveOver(std::vector<T>& from, std::vector<T>& to) {
 }  // namespace
 
 void Planning::start(Transport& transport, const StreamConfig& config) {
-  planner_ = std::make_unique<Planner>(transport, config);
+  planner_ = std::make_unique<Planner>(transport, config, told_);
   {
     const std::lock_guard lock(turn_);
     wanted_ = stopped_ = false;

@@ -48,6 +48,7 @@ class Planning {
   PlanOn on_;
   // Of the thread that makes passes.
   std::unique_ptr<Planner> planner_;
+  ToldPages told_;
   Snapshot snapshot_;
   bool began_ = false;  // a snapshot has come
   std::vector<Change> made_;
