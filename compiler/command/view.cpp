@@ -66,6 +66,14 @@ void addView(CLI::App& app, Run& run) {
       ->capture_default_str();
   command->add_option("--gpu-budget", options.gpuBudget, "Bytes of GPU memory at most (default 1 GiB)")
       ->transform(CLI::AsSizeValue(false));
+  command
+      ->add_option("--frame-budget", options.frameBudget,
+                   "Bytes of the GPU budget for frames, which come and go as they play (default: half)")
+      ->transform(CLI::AsSizeValue(false));
+  command
+      ->add_option("--cpu-budget", options.cpuBudget,
+                   "Bytes of memory for frames on their way to the GPU at most (default 64 MiB)")
+      ->transform(CLI::AsSizeValue(false));
   command->add_option("--device", options.device, "Vulkan device number (default: the fastest kind there is)");
   command->callback([arguments, &run] { run = [arguments] { return runView(*arguments); }; });
 }

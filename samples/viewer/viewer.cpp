@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <numbers>
 #include <system_error>
+#include <utility>
 
 #include "command.h"
 #include "orbit.h"
@@ -27,6 +28,7 @@ namespace {
 
 constexpr double kMostSeconds = 0.1;        // that pass between two pictures; a stall is no leap
 constexpr double kIdleSeconds = 0.5;        // between looks at a window in which nothing happens
+constexpr double kLongestShot = 3;          // that a picture for a file waits for what is on its way
 constexpr int kSettling = 3;                // pictures after an event until the panels have come to rest
 constexpr double kTurn = std::numbers::pi;  // radians over the height of the picture
 constexpr std::array kSpeeds = {-4.0, -2.0, -1.0, -0.5, -0.25, 0.25, 0.5, 1.0, 2.0, 4.0};
@@ -53,6 +55,10 @@ std::unique_ptr<headless::Headless> openDevice(const Window& window, std::option
   return valueOf(headless::Headless::create(options));
 }
 
+StreamBudgets budgetsOf(const ViewOptions& options) {
+  return {.gpu = options.frameBudget.value_or(options.gpuBudget / 2), .cpu = options.cpuBudget};
+}
+
 class Viewer {
  public:
   Viewer(const ViewOptions& options, std::unique_ptr<Document> document)
@@ -63,7 +69,7 @@ class Viewer {
         gpu_(openDevice(window_, options.device)),
         screen_(gpu_->device(), window_.makeSurface(gpu_->host().instance)),
         canvas_(gpu_->device()),
-        painter_(*gpu_, options.gpuBudget) {
+        painter_(*gpu_, options.gpuBudget, budgetsOf(options)) {
     take(std::move(document));
   }
 
@@ -86,7 +92,8 @@ class Viewer {
 
  private:
   bool idle() const {
-    return settling_ == 0 && !redraw_ && !painter_.waiting() && document_->timeline->velocity() == 0;
+    const bool waiting = painter_.player() != nullptr && painter_.player()->waiting();
+    return settling_ == 0 && !redraw_ && !shoot_ && !waiting && document_->timeline->velocity() == 0;
   }
 
   void take(std::unique_ptr<Document> document) {
@@ -126,9 +133,13 @@ class Viewer {
       place();
       resetCamera();
     }
+    if (painter_.player() != nullptr && painter_.player()->takeRenewed()) renew();
     const std::uint32_t jumps = document_->timeline->jumps();
     take(input);
-    document_->timeline->advance(std::clamp(passed, 0.0, kMostSeconds));
+    // What stands may have waited for long; what plays makes no leap.
+    const double seconds = document_->timeline->playing() ? std::clamp(passed, 0.0, kMostSeconds) : passed;
+    document_->timeline->advance(seconds);
+    unplayed_ += seconds;
     const Asked asked = panels_.draw(*document_, *camera_, report(passed));
     window_.setPicture(panels_.picture(), panels_.covered());
     window_.setTyping(panels_.typing());
@@ -153,12 +164,16 @@ class Viewer {
 
   Report report(double passed) const {
     Report report{.deviceName = gpu_->deviceName(),
-                  .residency = painter_.residency(),
                   .bytesInUse = painter_.bytesInUse(),
                   .budget = painter_.budget(),
                   .times = painter_.times(),
                   .pictureMilliseconds = idle() ? 0 : passed * 1000,
                   .voxelSize = painter_.voxelSize()};
+    if (const Player* player = painter_.player()) {
+      report.residency = player->residency();
+      report.traffic = player->traffic();
+      report.streaming = player->budgets();
+    }
     return report;
   }
 
@@ -214,15 +229,42 @@ class Viewer {
 
   void obey(const Asked& asked) {
     if (asked.choice) return open(document_->path(), asked.choice);
-    if (asked.remakeSpace) {
-      if (const auto done = painter_.remakeSpace(*document_); !done) panels_.complain(done.error().message);
+    if (asked.regrid) regrid(*asked.regrid);
+    if (asked.streaming && painter_.player() != nullptr) {
+      painter_.player()->setBudgets({.gpu = *asked.streaming, .cpu = options_.cpuBudget});
     }
+    if (asked.remakeSpace) remakeSpace();
     if (asked.frameAll) {
       camera_->frame(document_->stage().box, double{1} * document_->request.width / document_->request.height);
     }
     if (asked.resetCamera) resetCamera();
-    shoot_ |= asked.screenshot;
+    if (asked.screenshot && !std::exchange(shoot_, true)) asked_ = glfwGetTime();
     redraw_ |= asked.remakeSpace || asked.frameAll || asked.screenshot;
+  }
+
+  void remakeSpace() {
+    if (const auto done = painter_.remakeSpace(*document_); !done) panels_.complain(done.error().message);
+    redraw_ = true;
+  }
+
+  // Looks, extent and time line of the document, after its grids or its packs have become others.
+  void renew() {
+    if (const auto done = document_->renew(); !done) panels_.complain(done.error().message);
+    remakeSpace();
+  }
+
+  void regrid(std::size_t volume) {
+    renew();
+    if (painter_.player() != nullptr) painter_.player()->regrid(volume);
+  }
+
+  // Goes on to the moment of the time line, with what has arrived.
+  void stream() {
+    painter_.update(std::exchange(unplayed_, 0), {.view = camera_->view(), .pixelsHigh = canvas_.size().height});
+    Player* player = painter_.player();
+    if (player == nullptr) return;
+    redraw_ |= player->changed();
+    while (const auto error = player->takeError()) panels_.complain(*error);
   }
 
   runtime::DrawInfo describe(bool opaque) const {
@@ -247,10 +289,8 @@ class Viewer {
     painter_.readTimes(screen_.slot());
     std::string& title = titles_[screen_.slot()];
     if (!title.empty()) window_.setTitle(title);
-    const Timeline& timeline = *document_->timeline;
-    painter_.update(timeline.time(), timeline.velocity());
-    while (const auto error = painter_.takeError()) panels_.complain(*error);
-    if (shoot_) shoot();
+    stream();
+    if (shoot_ && complete()) shoot();
     if (redraw_) {
       const auto done = painter_.paint(commands, canvas_, describe(true), screen_.slot());
       if (done) {
@@ -263,8 +303,15 @@ class Viewer {
     redraw_ = false;
     const PictureSource source{painted_ ? canvas_.shown() : VK_NULL_HANDLE, canvas_.size(), place_};
     screen_.end(source, ImGui::GetDrawData(), painter_.wait());
+    const Timeline& timeline = *document_->timeline;
     title = fmt::format("{} - frame {} - {} - billow", document_->name(), timeline.ticks()[timeline.tick()].number,
                         timeline.playing() ? "playing" : "paused");
+  }
+
+  // Whether the picture is as good as it gets: a picture for a file waits for what it lacks, but not for ever.
+  bool complete() {
+    const Player* player = painter_.player();
+    return player == nullptr || player->complete() || glfwGetTime() - asked_ > kLongestShot;
   }
 
   // The picture without panels, to a file that is not there yet.
@@ -304,6 +351,8 @@ class Viewer {
   VkRect2D place_{};
   std::array<std::string, kFramesInFlight> titles_;  // of the pictures in flight: the window's tells what it shows
   double last_ = 0;
+  double unplayed_ = 0;  // seconds that the time line has advanced since the last update of the frames
+  double asked_ = 0;     // when the picture was asked for that shoot_ is about
   int settling_ = kSettling;
   bool redraw_ = true;    // the picture does not show what it should
   bool painted_ = false;  // the canvas has one

@@ -16,6 +16,8 @@ struct ViewOptions {
   std::uint32_t width = 1280, height = 800;  // of the window
   std::string screenshots = ".";             // folder to which F12 writes
   std::uint64_t gpuBudget = std::uint64_t{1} << 30;
+  std::optional<std::uint64_t> frameBudget;  // of it, for frames; default: half
+  std::uint64_t cpuBudget = std::uint64_t{64} << 20;
   std::optional<std::uint32_t> device;
 };
 
