@@ -61,7 +61,7 @@ void addView(CLI::App& app, Run& run) {
   auto* volume =
       command->add_option("--volume", arguments->volume, "Of a pack, the volume to show (default: the first)");
   command->add_option("--effect", arguments->effect, "Of a pack, the effect to show")->excludes(volume);
-  command->add_option("--size", arguments->size, "Of the window, WIDTHxHEIGHT (default 1280x800)");
+  command->add_option("--size", arguments->size, "Of the window, WIDTHxHEIGHT (default 1280x920)");
   command->add_option("--screenshots", options.screenshots, "Folder to which F12 writes pictures")
       ->capture_default_str();
   command->add_option("--gpu-budget", options.gpuBudget, "Bytes of GPU memory at most (default 1 GiB)")

@@ -35,8 +35,13 @@ Clock clockOf(const command::PlacedVolume& volume, const command::RenderRequest&
   if (volume.still) return stillAt(frames, *volume.still);
   const double rate = double{volume.record().framesPerSecond}, frameTime = 1 / rate;
   const double factor = volume.request->framesPerSecond.value_or(rate) / rate;
-  const double time = snapped(frames, (timeline.time() - volume.request->begin) * factor, kRounding * frameTime);
+  const double rounding = kRounding * frameTime;
   const double first = frames.front().time, last = frames.back().time;
+  double time = (timeline.time() - volume.request->begin) * factor;
+  if (request.scene && volume.request->after == command::AfterLast::loop && time > first) {
+    time = first + std::fmod(time - first + rounding, last - first + frameTime) - rounding;
+  }
+  time = snapped(frames, time, rounding);
 
   Clock clock{.time = time - first, .playback = {.interpolation = request.interpolate}};
   if (request.scene) {

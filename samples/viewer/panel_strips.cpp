@@ -77,10 +77,13 @@ bool drawTimeStrip(const Timeline& timeline, const std::vector<std::uint8_t>& re
   return true;
 }
 
-void drawResidency(const Report& report, Asked& asked) {
+void drawFrames(const std::vector<std::uint8_t>& residency) {
   ImVec2 size;
   const ImVec2 corner = box("frames", 10, size);
-  if (!report.residency.empty()) drawCells(corner, size, report.residency.size(), report.residency);
+  drawCells(corner, size, residency.size(), residency);
+}
+
+void drawResidency(const Report& report, Asked& asked) {
   drawShare(report.traffic.now().gpuAllocated, report.streaming.gpu, "frames");
   drawShare(report.bytesInUse, report.budget, "all");
   constexpr float kLeast = 1;

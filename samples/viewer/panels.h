@@ -89,6 +89,8 @@ class Panels {
 // Frames of the time line, coloured by the detail in which they are resident, and the time; true where the user takes
 // it elsewhere, which is then in `time`.
 bool drawTimeStrip(const Timeline& timeline, const std::vector<std::uint8_t>& residency, float height, double& time);
+// The frames alone.
+void drawFrames(const std::vector<std::uint8_t>& residency);
 // Where the bytes are and what the passes take.
 void drawResidency(const Report& report, Asked& asked);
 void drawTimes(const Report& report);
