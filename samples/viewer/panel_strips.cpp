@@ -71,7 +71,8 @@ bool drawTimeStrip(const Timeline& timeline, const std::vector<std::uint8_t>& re
   const auto share = static_cast<float>((timeline.time() - timeline.begin()) / length);
   const float x = corner.x + share * size.x;
   list.AddRectFilled({x - 1.5f, corner.y - 2}, {x + 1.5f, corner.y + size.y + 2}, kHead);
-  if (!ImGui::IsItemActive()) return false;
+  const bool held = ImGui::IsItemActive() || ImGui::IsItemDeactivated();
+  if (!held || !ImGui::IsMousePosValid()) return false;
   const float at = std::clamp((ImGui::GetIO().MousePos.x - corner.x) / size.x, 0.0f, 1.0f);
   time = timeline.begin() + double{at} * length;
   return true;

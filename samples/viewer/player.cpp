@@ -7,8 +7,10 @@
 namespace billow::viewer {
 namespace {
 
-constexpr double kSettling = 0.5;         // seconds without a change after which nothing more is expected
-constexpr std::uint32_t kTelling = 3;     // updates until what planning says is of this moment
+constexpr double kSettling = 0.5;  // seconds without a change after which nothing more is expected
+// Until what planning says is of this moment: updates while it moves, seconds without a change while it stands.
+constexpr std::uint32_t kTelling = 3;
+constexpr double kQuiet = 0.25;
 constexpr double kWatching = 0.5;         // seconds between two looks at the packs' files
 constexpr std::uint64_t kRing = 8 << 20;  // of staging, bytes at most
 
@@ -65,10 +67,13 @@ void Player::update(const Timeline& timeline, double seconds, const Seen& seen) 
   const bool jumped = follow(timeline);
   // Who has been sent to this moment is there.
   streamer_->update({.seconds = jumped ? 0 : seconds, .view = seen.view, .pixelsHigh = seen.pixelsHigh});
-  traffic_.add(streamer_->stats(), seconds);
+  const auto now = std::chrono::steady_clock::now();
+  const std::chrono::duration<double> passed = now - std::exchange(updated_, now);
+  traffic_.add(streamer_->stats(), passed.count());
   swapGrids();
   look();
-  arrived_ = jumped ? 0 : arrived_ + 1;
+  updates_ = jumped ? 0 : updates_ + 1;
+  moving_ = timeline.velocity() != 0;
   quiet_ = jumped || changed_ ? 0 : quiet_ + seconds;
   watch(seconds);
 }
@@ -133,7 +138,8 @@ bool Player::complete() const {
   const bool all = std::accumulate(stats.missingBricks.begin(), stats.missingBricks.end(), std::uint64_t{0}) == 0;
   const bool sharp = std::none_of(drawables_.begin(), drawables_.end(),
                                   [](const runtime::Drawable& shown) { return shown.held || shown.coarse; });
-  return arrived_ >= kTelling && all && sharp && stats.instancesEmpty == 0;
+  const bool told = moving_ ? updates_ >= kTelling : quiet_ >= kQuiet;
+  return told && all && sharp && stats.instancesEmpty == 0;
 }
 
 bool Player::waiting() const {

@@ -3,6 +3,7 @@
 #ifndef BILLOW_VIEWER_PLAYER_H
 #define BILLOW_VIEWER_PLAYER_H
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -97,8 +98,10 @@ class Player {
   Traffic traffic_;
   std::vector<std::string> errors_;
   std::optional<std::uint32_t> jumps_, seeks_;  // of the time line, as of the last update()
-  std::uint32_t arrived_ = 0;                   // updates since a jump
-  double quiet_ = 0;                            // seconds since something changed
+  std::uint32_t updates_ = 0;                   // since a jump
+  bool moving_ = false;                         // the time line
+  std::chrono::steady_clock::time_point updated_ = std::chrono::steady_clock::now();
+  double quiet_ = 0;  // seconds since something changed
   double unwatched_ = 0;
   bool changed_ = false, renewed_ = false;
 };

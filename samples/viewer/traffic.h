@@ -12,7 +12,7 @@ namespace billow::viewer {
 
 class Traffic {
  public:
-  // After each update(), with the seconds since the one before.
+  // After each update(), with the seconds since the one before, whether they were played or not.
   void add(const runtime::StreamStats& stats, double seconds);
 
   const runtime::StreamStats& now() const { return now_; }

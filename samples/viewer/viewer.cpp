@@ -12,15 +12,14 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
-#include <system_error>
 #include <utility>
 
 #include "command.h"
 #include "orbit.h"
 #include "painter.h"
 #include "panels.h"
-#include "render_image.h"
 #include "screen.h"
+#include "shots.h"
 #include "window.h"
 
 namespace billow::viewer {
@@ -28,7 +27,6 @@ namespace {
 
 constexpr double kMostSeconds = 0.1;        // that pass between two pictures; a stall is no leap
 constexpr double kIdleSeconds = 0.5;        // between looks at a window in which nothing happens
-constexpr double kLongestShot = 3;          // that a picture for a file waits for what is on its way
 constexpr int kSettling = 3;                // pictures after an event until the panels have come to rest
 constexpr double kTurn = std::numbers::pi;  // radians over the height of the picture
 constexpr std::array kSpeeds = {-4.0, -2.0, -1.0, -0.5, -0.25, 0.25, 0.5, 1.0, 2.0, 4.0};
@@ -69,7 +67,8 @@ class Viewer {
         gpu_(openDevice(window_, options.device)),
         screen_(gpu_->device(), window_.makeSurface(gpu_->host().instance)),
         canvas_(gpu_->device()),
-        painter_(*gpu_, options.gpuBudget, budgetsOf(options)) {
+        painter_(*gpu_, options.gpuBudget, budgetsOf(options)),
+        shots_(options.screenshots) {
     take(std::move(document));
   }
 
@@ -93,7 +92,7 @@ class Viewer {
  private:
   bool idle() const {
     const bool waiting = painter_.player() != nullptr && painter_.player()->waiting();
-    return settling_ == 0 && !redraw_ && !shoot_ && !waiting && document_->timeline->velocity() == 0;
+    return settling_ == 0 && !redraw_ && !shots_.asked() && !waiting && document_->timeline->velocity() == 0;
   }
 
   void take(std::unique_ptr<Document> document) {
@@ -128,7 +127,13 @@ class Viewer {
   void picture(VkExtent2D pixels, const Input& input, double passed) {
     ImGui_ImplVulkan_NewFrame();
     ImGui_ImplGlfw_NewFrame();
+    if (input.released) released_ = input.released;
+    if (released_) {
+      // While a slow picture was drawn the pointer has gone on: what it held was let go there.
+      ImGui::GetIO().MousePos = {static_cast<float>((*released_)[0]), static_cast<float>((*released_)[1])};
+    }
     ImGui::NewFrame();
+    if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) released_.reset();
     if (!camera_) {
       place();
       resetCamera();
@@ -238,7 +243,7 @@ class Viewer {
       camera_->frame(document_->stage().box, double{1} * document_->request.width / document_->request.height);
     }
     if (asked.resetCamera) resetCamera();
-    if (asked.screenshot && !std::exchange(shoot_, true)) asked_ = glfwGetTime();
+    if (asked.screenshot) shots_.ask(glfwGetTime());
     redraw_ |= asked.remakeSpace || asked.frameAll || asked.screenshot;
   }
 
@@ -290,7 +295,7 @@ class Viewer {
     std::string& title = titles_[screen_.slot()];
     if (!title.empty()) window_.setTitle(title);
     stream();
-    if (shoot_ && complete()) shoot();
+    if (shots_.due(painter_.player(), glfwGetTime())) shoot();
     if (redraw_) {
       const auto done = painter_.paint(commands, canvas_, describe(true), screen_.slot());
       if (done) {
@@ -308,34 +313,16 @@ class Viewer {
                         timeline.playing() ? "playing" : "paused");
   }
 
-  // Whether the picture is as good as it gets: a picture for a file waits for what it lacks, but not for ever.
-  bool complete() {
-    const Player* player = painter_.player();
-    return player == nullptr || player->complete() || glfwGetTime() - asked_ > kLongestShot;
-  }
-
-  // The picture without panels, to a file that is not there yet.
+  // The picture without panels.
   void shoot() {
-    shoot_ = false;
     const auto picture = painter_.picture(describe(!panels_.exr()));
     if (!picture) return panels_.complain(picture.error().message);
     const Timeline& timeline = *document_->timeline;
-    const std::filesystem::path folder(options_.screenshots);
     const std::string stem = fmt::format("{}_{:04}", std::filesystem::path(document_->path()).stem().string(),
                                          timeline.ticks()[timeline.tick()].number);
-    const char* extension = panels_.exr() ? ".exr" : ".png";
-    std::filesystem::path path = folder / (stem + extension);
-    std::error_code ignored;
-    for (int i = 2; std::filesystem::exists(path, ignored); ++i) {
-      path = folder / fmt::format("{}_{}{}", stem, i, extension);
-    }
-    try {
-      command::writeWhole(path.string(), panels_.exr() ? command::encodeExr(*picture)
-                                                       : command::encodePng(*picture, document_->request.exposure));
-      panels_.tell("Picture in " + path.string(), ImGui::GetTime());
-    } catch (const std::exception& error) {
-      panels_.complain(error.what());
-    }
+    const auto path = shots_.write(*picture, stem, panels_.exr(), document_->request.exposure);
+    if (!path) return panels_.complain(path.error().message);
+    panels_.tell("Picture in " + *path, ImGui::GetTime());
   }
 
   const ViewOptions& options_;
@@ -347,16 +334,16 @@ class Viewer {
   Canvas canvas_;
   std::unique_ptr<Document> document_;
   Painter painter_;
+  Shots shots_;
   std::optional<OrbitCamera> camera_;
   VkRect2D place_{};
   std::array<std::string, kFramesInFlight> titles_;  // of the pictures in flight: the window's tells what it shows
+  std::optional<std::array<double, 2>> released_;
   double last_ = 0;
   double unplayed_ = 0;  // seconds that the time line has advanced since the last update of the frames
-  double asked_ = 0;     // when the picture was asked for that shoot_ is about
   int settling_ = kSettling;
   bool redraw_ = true;    // the picture does not show what it should
   bool painted_ = false;  // the canvas has one
-  bool shoot_ = false;
 };
 
 }  // namespace

@@ -16,6 +16,14 @@ constexpr double kSeconds = 6 / 24.0;  // of the sample fire
 
 class ViewerStreaming : public ViewerWindow {
  protected:
+  // While it is paused.
+  void stepTo(int number) {
+    do {
+      const int before = frame();
+      screen_.hand("key Right");
+      ASSERT_TRUE(eventually([&] { return frame() != before; }));
+    } while (frame() != number);
+  }
   // How much redder than green the strip is at a frame: the coarser it is resident, the more.
   int coarseness(std::uint32_t frame) const {
     const std::uint32_t x = kStripLeft + (2 * frame + 1) * kStripWidth / 12 + 4;
@@ -25,7 +33,7 @@ class ViewerStreaming : public ViewerWindow {
 };
 
 TEST_F(ViewerStreaming, ScrubbingEndsInThePictureOfItsMoment) {
-  ASSERT_NO_FATAL_FAILURE(compile("35"));
+  ASSERT_NO_FATAL_FAILURE(compile("--psnr 35"));
   ASSERT_NO_FATAL_FAILURE(start());
   ASSERT_NO_FATAL_FAILURE(pause());
   std::string drag = "mousemove 20 230 mousedown 1";
@@ -44,7 +52,7 @@ TEST_F(ViewerStreaming, ScrubbingEndsInThePictureOfItsMoment) {
 }
 
 TEST_F(ViewerStreaming, PlaysOnInAQuarterOfTheMemory) {
-  ASSERT_NO_FATAL_FAILURE(compile("35"));
+  ASSERT_NO_FATAL_FAILURE(compile("--psnr 35"));
   ASSERT_NO_FATAL_FAILURE(start("--frame-budget 120K"));
   moveAway();
   std::set<int> frames;
@@ -67,7 +75,7 @@ TEST_F(ViewerStreaming, PlaysOnInAQuarterOfTheMemory) {
 }
 
 TEST_F(ViewerStreaming, TheStripTellsWhatIsResident) {
-  ASSERT_NO_FATAL_FAILURE(compile("35"));
+  ASSERT_NO_FATAL_FAILURE(compile("--psnr 35"));
   ASSERT_NO_FATAL_FAILURE(start());
   moveAway();
   EXPECT_TRUE(eventually([&] {
@@ -79,30 +87,41 @@ TEST_F(ViewerStreaming, TheStripTellsWhatIsResident) {
 }
 
 TEST_F(ViewerStreaming, DrawsTheGridsThatTheSceneChooses) {
-  ASSERT_NO_FATAL_FAILURE(compile("35", R"(, "grids": {"extinction": "flame", "flames": "none"})"));
+  ASSERT_NO_FATAL_FAILURE(compile("--psnr 35", R"(, "grids": {"extinction": "flame", "flames": "none"})"));
   ASSERT_NO_FATAL_FAILURE(start());
   moveAway();
   ASSERT_NO_FATAL_FAILURE(pause());
-  screen_.hand("key Right");
+  ASSERT_NO_FATAL_FAILURE(stepTo(10));
   Shot shown, rendered, usual;
   ASSERT_NO_FATAL_FAILURE(shoot(shown));
-  ASSERT_NO_FATAL_FAILURE(render(scene_, "--frame " + std::to_string(frame()), rendered));
+  ASSERT_NO_FATAL_FAILURE(render(scene_, "--frame 10", rendered));
   EXPECT_LE(difference(shown, rendered).largest, 2);
-  ASSERT_NO_FATAL_FAILURE(compile("35"));
-  ASSERT_NO_FATAL_FAILURE(render(scene_, "--frame " + std::to_string(frame()), usual));
+  ASSERT_NO_FATAL_FAILURE(compile("--psnr 35"));
+  ASSERT_NO_FATAL_FAILURE(render(scene_, "--frame 10", usual));
   EXPECT_GT(difference(shown, usual).mean, 1);
   quit();
 }
 
-TEST_F(ViewerStreaming, APackThatIsWrittenAnewTakesThePlaceOfTheOld) {
-  ASSERT_NO_FATAL_FAILURE(compile("35"));
+TEST_F(ViewerStreaming, DrawsTheLevelThatTheSceneAsksFor) {
+  ASSERT_NO_FATAL_FAILURE(compile("--psnr 35 --levels 2", R"(, "level": 2)"));
   ASSERT_NO_FATAL_FAILURE(start());
   moveAway();
   ASSERT_NO_FATAL_FAILURE(pause());
-  for (int number = frame(); number != 8; number = frame()) {
-    screen_.hand("key Right");
-    ASSERT_TRUE(eventually([&] { return frame() != number; }));
-  }
+  ASSERT_NO_FATAL_FAILURE(stepTo(10));
+  Shot shown, rendered;
+  ASSERT_NO_FATAL_FAILURE(shoot(shown));
+  ASSERT_NO_FATAL_FAILURE(render(scene_, "--frame 10", rendered));
+  EXPECT_GT(burning(shown), 300u);
+  EXPECT_LE(difference(shown, rendered).largest, 2);
+  quit();
+}
+
+TEST_F(ViewerStreaming, APackThatIsWrittenAnewTakesThePlaceOfTheOld) {
+  ASSERT_NO_FATAL_FAILURE(compile("--psnr 35"));
+  ASSERT_NO_FATAL_FAILURE(start());
+  moveAway();
+  ASSERT_NO_FATAL_FAILURE(pause());
+  ASSERT_NO_FATAL_FAILURE(stepTo(8));
   Shot before, after, rendered;
   ASSERT_NO_FATAL_FAILURE(shoot(before));
   ASSERT_EQ(billow("compile '" + sampleFire() + "' --frames 12 --psnr 35 -o '" + (folder_ / "fire.blw") + "'").code, 0);

@@ -63,9 +63,9 @@ inline Difference difference(const Shot& a, const Shot& b) {
 class ViewerWindow : public testing::Test {
  protected:
   // A scene of the sample fire with coarse voxels, so that a CPU draws it in little time.
-  void compile(const std::string& psnr, const std::string& sceneMembers = "") {
+  void compile(const std::string& options, const std::string& sceneMembers = "") {
     const CommandResult made =
-        billow("compile '" + sampleFire() + "' --psnr " + psnr + " -o '" + (folder_ / "fire.blw") + "'");
+        billow("compile '" + sampleFire() + "' " + options + " -o '" + (folder_ / "fire.blw") + "'");
     ASSERT_EQ(made.code, 0) << made.err;
     std::ofstream(scene_) << R"({"pack": "fire.blw", "voxelSize": 0.4, "look": {"scatteringOrders": 1})" << sceneMembers
                           << "}";

@@ -41,7 +41,7 @@ std::size_t breakFirstFrame(const std::string& path) {
 }
 
 TEST_F(ViewerWindow, PlaysPausesStepsAndTakesPictures) {
-  ASSERT_NO_FATAL_FAILURE(compile("35"));
+  ASSERT_NO_FATAL_FAILURE(compile("--psnr 35"));
   ASSERT_NO_FATAL_FAILURE(start());
   moveAway();
   std::set<int> frames;
@@ -83,7 +83,7 @@ TEST_F(ViewerWindow, PlaysPausesStepsAndTakesPictures) {
 }
 
 TEST_F(ViewerWindow, OrbitsChangesItsLookAndItsSize) {
-  ASSERT_NO_FATAL_FAILURE(compile("35"));
+  ASSERT_NO_FATAL_FAILURE(compile("--psnr 35"));
   ASSERT_NO_FATAL_FAILURE(start());
   moveAway();
   ASSERT_NO_FATAL_FAILURE(pause());
@@ -132,7 +132,7 @@ TEST_F(ViewerWindow, OrbitsChangesItsLookAndItsSize) {
 
 // A page that cannot be read is told of in the window; the rest plays on.
 TEST_F(ViewerWindow, ABrokenPageIsNoEnd) {
-  ASSERT_NO_FATAL_FAILURE(compile("50"));  // a frame fills pages of its own
+  ASSERT_NO_FATAL_FAILURE(compile("--psnr 50"));  // a frame fills pages of its own
   ASSERT_GT(breakFirstFrame(folder_ / "fire.blw"), 0u);
   ASSERT_NO_FATAL_FAILURE(start());
   screen_.hand("key Tab");  // the message leaves room for the picture
