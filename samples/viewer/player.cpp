@@ -11,8 +11,8 @@ constexpr double kSettling = 0.5;  // seconds without a change after which nothi
 // Until what planning says is of this moment: updates while it moves, seconds without a change while it stands.
 constexpr std::uint32_t kTelling = 3;
 constexpr double kQuiet = 0.25;
-constexpr double kWatching = 0.5;         // seconds between two looks at the packs' files
-constexpr std::uint64_t kRing = 8 << 20;  // of staging, bytes at most
+constexpr double kWatching = 0.5;                                // seconds between two looks at the packs' files
+constexpr std::uint64_t kLeastRing = 64 << 10, kRing = 8 << 20;  // of staging, bytes
 
 bool sameLayers(const runtime::Drawable& a, const runtime::Drawable& b) {
   return a.count == b.count && std::equal(a.layers.begin(), a.layers.begin() + a.count, b.layers.begin(),
@@ -29,7 +29,7 @@ command::Checked<std::unique_ptr<Player>> Player::make(runtime::Renderer& render
   std::unique_ptr<Player> player(new Player(contents, request, budgets));
   auto streamer = runtime::Streamer::create(renderer, {.gpuBudget = budgets.gpu,
                                                        .cpuBudget = budgets.cpu,
-                                                       .stagingBytes = std::min(kRing, budgets.cpu / 4),
+                                                       .stagingBytes = std::clamp(budgets.cpu / 4, kLeastRing, kRing),
                                                        .framesInFlight = framesInFlight});
   if (!streamer) return tl::unexpected(command::toRefusal(streamer.error(), ""));
   player->streamer_ = std::move(*streamer);
