@@ -71,6 +71,7 @@ struct FakeFrame {
   const runtime::OpenPack* pack = nullptr;
   std::uint32_t volume = 0, frame = 0;
   bool means = false;
+  runtime::GridChoice grids = {};
 };
 
 // Loads take `latency` updates, `parallel` of them at a time. Counts as the real one does, and fails the test where the
@@ -199,7 +200,8 @@ class FakeTransport final : public runtime::Transport {
     frame->stats_.allocatedBytes = load.bytes;
     used_ += load.bytes;
     frame->memory_ = std::make_unique<Counted>(alive_);
-    known_[frame.get()] = {load.order.pack.get(), load.order.volume, load.order.frame, load.order.means};
+    known_[frame.get()] = {load.order.pack.get(), load.order.volume, load.order.frame, load.order.means,
+                           load.order.grids};
     arrivals_.push_back({load.order.ticket, std::move(frame), std::nullopt});
     return true;
   }

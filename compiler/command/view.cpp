@@ -61,10 +61,18 @@ void addView(CLI::App& app, Run& run) {
   auto* volume =
       command->add_option("--volume", arguments->volume, "Of a pack, the volume to show (default: the first)");
   command->add_option("--effect", arguments->effect, "Of a pack, the effect to show")->excludes(volume);
-  command->add_option("--size", arguments->size, "Of the window, WIDTHxHEIGHT (default 1280x800)");
+  command->add_option("--size", arguments->size, "Of the window, WIDTHxHEIGHT (default 1280x920)");
   command->add_option("--screenshots", options.screenshots, "Folder to which F12 writes pictures")
       ->capture_default_str();
   command->add_option("--gpu-budget", options.gpuBudget, "Bytes of GPU memory at most (default 1 GiB)")
+      ->transform(CLI::AsSizeValue(false));
+  command
+      ->add_option("--frame-budget", options.frameBudget,
+                   "Bytes of the GPU budget for frames, which come and go as they play (default: half)")
+      ->transform(CLI::AsSizeValue(false));
+  command
+      ->add_option("--cpu-budget", options.cpuBudget,
+                   "Bytes of memory for frames on their way to the GPU at most (default 64 MiB)")
       ->transform(CLI::AsSizeValue(false));
   command->add_option("--device", options.device, "Vulkan device number (default: the fastest kind there is)");
   command->callback([arguments, &run] { run = [arguments] { return runView(*arguments); }; });

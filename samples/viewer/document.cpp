@@ -148,20 +148,39 @@ Checked<std::unique_ptr<Document>> Document::open(const std::string& path, const
   document->request.method = command::Method::metavoxel;
   document->request.interpolate = runtime::Interpolation::blend;
   spreadFactors(document->request);
-  auto contents = command::Contents::find(document->request);
-  if (!contents) return tl::unexpected(contents.error());
-  document->contents_ = std::move(*contents);
-  document->timeline = timelineOf(document->request, *document->contents_);
-  std::vector<double> times;
-  for (std::size_t i = 0; i < kStageTimes && !document->contents_->effects().empty(); ++i) {
-    times.push_back(document->timeline->end() * static_cast<double>(i) / (kStageTimes - 1));
-  }
-  auto stage = command::stageOf(*document->contents_, times, document->needs_);
-  if (!stage) return tl::unexpected(stage.error());
-  document->stage_ = *stage;
-  document->needs_.particles = particlesWithRoom(*document->contents_, *document->timeline);
+  if (auto found = document->find(); !found) return tl::unexpected(found.error());
   document->original_ = document->request;
   return document;
+}
+
+Checked<void> Document::find() {
+  auto contents = command::Contents::find(request);
+  if (!contents) return tl::unexpected(contents.error());
+  auto line = timelineOf(request, *contents);
+  std::vector<double> times;
+  for (std::size_t i = 0; i < kStageTimes && !contents->effects().empty(); ++i) {
+    times.push_back(line->end() * static_cast<double>(i) / (kStageTimes - 1));
+  }
+  command::SpaceNeeds needs;
+  auto stage = command::stageOf(*contents, times, needs);
+  if (!stage) return tl::unexpected(stage.error());
+  needs.particles = particlesWithRoom(*contents, *line);
+  contents_ = std::move(*contents);
+  timeline = std::move(line);
+  stage_ = *stage;
+  needs_ = needs;
+  return {};
+}
+
+Checked<void> Document::renew() {
+  std::unique_ptr<Timeline> before = std::move(timeline);
+  auto found = find();
+  if (!found || before->sameTicks(*timeline)) {
+    timeline = std::move(before);
+  } else {
+    timeline->goOnAs(*before);
+  }
+  return found;
 }
 
 std::string Document::name() const {

@@ -49,12 +49,17 @@ class Document {
   // Whether a volume has velocity grids, which advection needs.
   bool hasVelocity() const;
 
+  // As opened anew with what the request now says, or the packs: grids, ticks and extent, but for where the time line
+  // is. What cannot be found leaves all as it was.
+  Checked<void> renew();
+
   // What the panels change; no volume and no effect is added or taken away.
   command::RenderRequest request;
   std::unique_ptr<Timeline> timeline;
 
  private:
   Document() = default;
+  Checked<void> find();
 
   std::string path_;
   std::vector<Choice> choices_;

@@ -15,7 +15,8 @@ constexpr std::uint32_t kBegin = runtime::kMetavoxelTimestamps, kEnd = kBegin + 
 
 }  // namespace
 
-Painter::Painter(headless::Headless& gpu, std::uint64_t gpuBudget) : gpu_(gpu), gpuBudget_(gpuBudget) {
+Painter::Painter(headless::Headless& gpu, std::uint64_t gpuBudget, const StreamBudgets& budgets)
+    : gpu_(gpu), gpuBudget_(gpuBudget), budgets_(budgets) {
   // One more for pictures that go to a file.
   renderer_ =
       valueOf(runtime::Renderer::create(gpu.host(), {.gpuBudget = gpuBudget, .recordsInFlight = kFramesInFlight + 1}));
@@ -32,18 +33,14 @@ Painter::~Painter() {
 Checked<void> Painter::show(const Document& document) {
   check(vkDeviceWaitIdle(device()), "vkDeviceWaitIdle");
   metavoxels_.reset();
-  document_ = &document;
-  makePlayer();
-  return remakeSpace(document);
-}
-
-// Frames have velocities or not: with another way to play come other frames.
-void Painter::makePlayer() {
-  check(vkDeviceWaitIdle(device()), "vkDeviceWaitIdle");
-  drawables_.clear();
+  if (player_) budgets_ = player_->budgets();
   player_.reset();
-  player_ = std::make_unique<Player>(*renderer_, document_->contents(), gpuBudget_ / 2, kFramesInFlight,
-                                     document_->request.interpolate);
+  document_ = &document;
+  auto player = Player::make(*renderer_, document.contents(), document.request, budgets_, kFramesInFlight);
+  if (player) player_ = std::move(*player);
+  auto made = remakeSpace(document);
+  if (!player) return tl::unexpected(player.error());
+  return made;
 }
 
 Checked<void> Painter::remakeSpace(const Document& document) {
@@ -63,22 +60,20 @@ Checked<void> Painter::remakeSpace(const Document& document) {
   return {};
 }
 
-void Painter::update(double time, double velocity) {
-  if (player_->interpolation() != document_->request.interpolate) makePlayer();
-  drawables_ = player_->update(time, velocity);
-  time_ = time;
+void Painter::update(double seconds, const Seen& seen) {
+  if (player_) player_->update(*document_->timeline, seconds, seen);
 }
 
 command::Shown Painter::shownIn(runtime::DrawInfo& draw) const {
   command::Shown shown;
-  for (std::size_t i = 0; i < drawables_.size(); ++i) {
-    const runtime::Drawable& drawable = drawables_[i];
+  for (std::size_t i = 0; player_ && i < player_->drawables().size(); ++i) {
+    const runtime::Drawable& drawable = player_->drawables()[i];
     if (drawable.count == 0) continue;
     const command::PlacedVolume& volume = document_->contents().volumes()[i];
     const std::span<const runtime::Layer> layers(drawable.layers.data(), drawable.count);
     shown.volumes.push_back(command::placed(document_->request, volume, layers, draw.look));
   }
-  shown.effects = document_->contents().effectsAt(time_);
+  shown.effects = document_->contents().effectsAt(document_->timeline->time());
   if (direct(shown)) {
     const auto& layers = shown.volumes[0].layers;
     const auto most = std::max_element(layers.begin(), layers.end(),
@@ -126,7 +121,9 @@ Checked<void> Painter::paint(VkCommandBuffer commands, const Canvas& canvas, run
 }
 
 SemaphoreWait Painter::wait() const {
-  return {renderer_->uploadSemaphore(), player_ ? player_->uploadValue() : 0};
+  if (!player_) return {};
+  const runtime::UploadWait wait = player_->wait();
+  return {wait.semaphore, wait.value};
 }
 
 void Painter::readTimes(std::uint32_t slot) {

@@ -24,22 +24,22 @@ struct PassTimes {
 class Painter {
  public:
   // Throws GpuFailure.
-  Painter(headless::Headless& gpu, std::uint64_t gpuBudget);
+  Painter(headless::Headless& gpu, std::uint64_t gpuBudget, const StreamBudgets& budgets);
   Painter(const Painter&) = delete;
   Painter& operator=(const Painter&) = delete;
   ~Painter();
 
-  // What is drawn from now on; it must outlive its being so. Waits for the device.
+  // What is drawn from now on; it must outlive its being so. What cannot be made leaves its part of the picture out.
+  // Waits for the device.
   Checked<void> show(const Document& document);
   // As show(), where the size of voxels or the light among them has changed; frames stay.
   Checked<void> remakeSpace(const Document& document);
 
-  // Brings the frames of this moment onto the device. Once a picture, before paint().
-  void update(double time, double velocity);
-  // What could not be loaded, each once.
-  std::optional<std::string> takeError() { return player_->takeError(); }
-  bool waiting() const { return player_ && player_->waiting(); }
-  Residency residency() const { return player_->residency(); }
+  // Goes on to where the document's time line is. Once a picture, before paint(), `seconds` after the one before.
+  void update(double seconds, const Seen& seen);
+  // Who has the frames; null where there is none to be had.
+  Player* player() { return player_.get(); }
+  const Player* player() const { return player_.get(); }
 
   // Records the picture of the moment of update(). `slot` as Screen has it, whose commands before have been executed.
   Checked<void> paint(VkCommandBuffer commands, const Canvas& canvas, runtime::DrawInfo draw, std::uint32_t slot);
@@ -57,7 +57,6 @@ class Painter {
   Checked<headless::Picture> picture(runtime::DrawInfo draw);
 
  private:
-  void makePlayer();
   // What there is to draw now. Of the direct method's draw frame and look are filled in.
   command::Shown shownIn(runtime::DrawInfo& draw) const;
   bool direct(const command::Shown& shown) const;
@@ -66,12 +65,11 @@ class Painter {
 
   headless::Headless& gpu_;
   std::uint64_t gpuBudget_;
+  StreamBudgets budgets_;
   std::unique_ptr<runtime::Renderer> renderer_;
   const Document* document_ = nullptr;
   std::optional<command::MetavoxelPainter> metavoxels_;
   std::unique_ptr<Player> player_;
-  std::vector<runtime::Drawable> drawables_;  // of the moment, by volume
-  double time_ = 0;
   QueryPool queries_;
   std::array<bool, kFramesInFlight> timed_{};   // whether the slot's queries were written
   std::array<bool, kFramesInFlight> passes_{};  // and those of metavoxels among them

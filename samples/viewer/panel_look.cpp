@@ -122,6 +122,32 @@ void Panels::drawLook(Document& document, Asked& asked) {
   }
 }
 
+// Which of the volume's grids are its matter, its heat and its flames.
+void Panels::drawGrids(Document& document, Asked& asked) {
+  const auto& volumes = document.contents().volumes();
+  if (volumes.empty()) return;
+  const auto number = static_cast<std::size_t>(volume_);
+  const command::PlacedVolume& volume = volumes[number];
+  if (volume.record().gridCount < 2 || !ImGui::CollapsingHeader("Grids")) return;
+  command::GridNames& names = document.request.volumes[number].grids;
+  const auto choose = [&](const char* label, std::uint32_t drawn, std::optional<std::string>& name) {
+    const auto grids = volume.pack->gridsOf(volume.record());
+    const std::string now(drawn == format::kNone ? "none" : volume.pack->string(grids[drawn].name));
+    if (!ImGui::BeginCombo(label, now.c_str())) return;
+    const auto offer = [&](const std::string& other) {
+      if (!ImGui::Selectable(other.c_str(), other == now) || other == now) return;
+      name = other;
+      asked.regrid = number;
+    };
+    offer("none");
+    for (const format::GridRecord& grid : grids) offer(std::string(volume.pack->string(grid.name)));
+    ImGui::EndCombo();
+  };
+  choose("matter", volume.grids.extinction, names.extinction);
+  choose("heat", volume.grids.temperature, names.temperature);
+  choose("flames", volume.grids.flames, names.flames);
+}
+
 void Panels::drawLight(Document& document, Asked& asked) {
   command::RenderRequest& request = document.request;
   const char up = request.up.value_or(document.stage().up);

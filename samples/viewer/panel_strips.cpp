@@ -10,7 +10,10 @@
 namespace billow::viewer {
 namespace {
 
-constexpr ImU32 kAbsent = IM_COL32(52, 53, 58, 255), kResident = IM_COL32(86, 132, 94, 255);
+constexpr ImU32 kAbsent = IM_COL32(52, 53, 58, 255);
+// By how much coarser they are: 2^n.
+constexpr std::array<ImU32, 4> kResident = {IM_COL32(86, 132, 94, 255), IM_COL32(122, 138, 82, 255),
+                                            IM_COL32(146, 130, 74, 255), IM_COL32(138, 100, 66, 255)};
 constexpr ImU32 kHead = IM_COL32(250, 153, 66, 255);
 constexpr std::array<ImU32, runtime::kMetavoxelTimestamps - 1> kPassColors = {
     IM_COL32(110, 130, 170, 255), IM_COL32(196, 122, 74, 255), IM_COL32(222, 190, 92, 255),
@@ -26,56 +29,74 @@ ImVec2 box(const char* name, float height, ImVec2& size) {
   return corner;
 }
 
-std::string megabytes(std::uint64_t bytes) {
-  return fmt::format("{:.1f} MiB", static_cast<double>(bytes) / (1 << 20));
+ImU32 colorOf(std::uint8_t level) {
+  return level == runtime::kNotResident ? kAbsent : kResident[std::min<std::size_t>(level, kResident.size() - 1)];
 }
 
-// Cells of frames, each as wide as a pixel or more.
-void drawCells(ImVec2 corner, ImVec2 size, std::size_t count, const std::vector<bool>& resident) {
+// Cells of frames, each as wide as a pixel or more; of several the coarsest.
+void drawCells(ImVec2 corner, ImVec2 size, std::size_t count, const std::vector<std::uint8_t>& residency) {
   ImDrawList& list = *ImGui::GetWindowDrawList();
   const auto columns = static_cast<std::size_t>(std::clamp(size.x, 1.0f, static_cast<float>(count)));
   const float width = size.x / static_cast<float>(columns);
   const float gap = width > 4 ? 1 : 0;
   for (std::size_t column = 0; column < columns; ++column) {
     const std::size_t first = column * count / columns, last = (column + 1) * count / columns;
-    bool all = resident.size() == count;
-    for (std::size_t frame = first; frame < last && all; ++frame) all = resident[frame];
+    std::uint8_t coarsest = residency.size() == count ? 0 : runtime::kNotResident;
+    for (std::size_t frame = first; frame < last && residency.size() == count; ++frame) {
+      coarsest = std::max(coarsest, residency[frame]);
+    }
     const float x = corner.x + width * static_cast<float>(column);
-    list.AddRectFilled({x, corner.y}, {x + width - gap, corner.y + size.y}, all ? kResident : kAbsent);
+    list.AddRectFilled({x, corner.y}, {x + width - gap, corner.y + size.y}, colorOf(coarsest));
   }
+}
+
+// A bar that is full where the budget is.
+void drawShare(std::uint64_t bytes, std::uint64_t budget, const char* of) {
+  const float share = static_cast<float>(bytes) / static_cast<float>(std::max<std::uint64_t>(budget, 1));
+  const std::string text =
+      fmt::format("{}: {} of {}", of, megabytes(static_cast<double>(bytes)), megabytes(static_cast<double>(budget)));
+  ImGui::PushStyleColor(ImGuiCol_PlotHistogram, kResident[0]);
+  ImGui::ProgressBar(share, {-1, 0}, text.c_str());
+  ImGui::PopStyleColor();
 }
 
 }  // namespace
 
-bool drawTimeStrip(const Timeline& timeline, const std::vector<bool>& resident, float height, double& time) {
+bool drawTimeStrip(const Timeline& timeline, const std::vector<std::uint8_t>& residency, float height, double& time) {
   ImVec2 size;
   const ImVec2 corner = box("time", height, size);
   const double length = timeline.end() - timeline.begin();
-  drawCells(corner, size, timeline.ticks().size(), resident);
+  drawCells(corner, size, timeline.ticks().size(), residency);
   ImDrawList& list = *ImGui::GetWindowDrawList();
   const auto share = static_cast<float>((timeline.time() - timeline.begin()) / length);
   const float x = corner.x + share * size.x;
   list.AddRectFilled({x - 1.5f, corner.y - 2}, {x + 1.5f, corner.y + size.y + 2}, kHead);
-  if (!ImGui::IsItemActive()) return false;
+  const bool held = ImGui::IsItemActive() || ImGui::IsItemDeactivated();
+  if (!held || !ImGui::IsMousePosValid()) return false;
   const float at = std::clamp((ImGui::GetIO().MousePos.x - corner.x) / size.x, 0.0f, 1.0f);
   time = timeline.begin() + double{at} * length;
   return true;
 }
 
-void drawResidency(const Report& report) {
-  const Residency& residency = report.residency;
+void drawFrames(const std::vector<std::uint8_t>& residency) {
   ImVec2 size;
   const ImVec2 corner = box("frames", 10, size);
-  if (!residency.frames.empty()) drawCells(corner, size, residency.frames.size(), residency.frames);
-  ImGui::Text("%u frames, %s", residency.resident, megabytes(residency.bytes).c_str());
-  ImGui::SameLine(0, 12);
-  ImGui::Text("late %llu", static_cast<unsigned long long>(residency.late));
-  const float share =
-      static_cast<float>(report.bytesInUse) / static_cast<float>(std::max<std::uint64_t>(report.budget, 1));
-  const std::string text = megabytes(report.bytesInUse) + " of " + megabytes(report.budget);
-  ImGui::PushStyleColor(ImGuiCol_PlotHistogram, kResident);
-  ImGui::ProgressBar(share, {-1, 0}, text.c_str());
-  ImGui::PopStyleColor();
+  drawCells(corner, size, residency.size(), residency);
+}
+
+void drawResidency(const Report& report, Asked& asked) {
+  drawShare(report.traffic.now().gpuAllocated, report.streaming.gpu, "frames");
+  drawShare(report.bytesInUse, report.budget, "all");
+  constexpr float kLeast = 1;
+  const float most = static_cast<float>(report.budget) / (1 << 20);
+  float budget = static_cast<float>(report.streaming.gpu) / (1 << 20);
+  if (ImGui::SliderFloat("budget", &budget, kLeast, most, "%.1f MiB",
+                         ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
+    asked.streaming = static_cast<std::uint64_t>(double{std::clamp(budget, kLeast, most)} * (1 << 20));
+  }
+  ImGui::PushTextWrapPos(0);
+  for (const std::string& line : linesOf(report.traffic)) ImGui::TextUnformatted(line.c_str());
+  ImGui::PopTextWrapPos();
 }
 
 void drawTimes(const Report& report) {

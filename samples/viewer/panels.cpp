@@ -126,9 +126,14 @@ void Panels::drawSide(Document& document, OrbitCamera& camera, const Report& rep
   const ImGuiTreeNodeFlags open = ImGuiTreeNodeFlags_DefaultOpen;
   if (document.choices().size() > 1) drawContents(document, asked);
   if (ImGui::CollapsingHeader("Look", open)) drawLook(document, asked);
+  drawGrids(document, asked);
   if (ImGui::CollapsingHeader("Light", open)) drawLight(document, asked);
   if (ImGui::CollapsingHeader("Drawing", open)) drawDrawing(document, report, asked);
-  if (ImGui::CollapsingHeader("Residency", open)) drawResidency(report);
+  if (ImGui::CollapsingHeader("Residency", open)) {
+    // The time line of a scene is none of a volume's frames.
+    if (document.request.scene && !report.residency.empty()) drawFrames(report.residency);
+    drawResidency(report, asked);
+  }
   if (ImGui::CollapsingHeader("Times", open)) drawTimes(report);
   if (ImGui::CollapsingHeader("Camera and picture")) drawCamera(camera, asked);
   ImGui::PopItemWidth();
@@ -218,7 +223,9 @@ void Panels::drawBelow(Document& document, const Report& report, Asked& asked) {
     ImGui::TextUnformatted(text.c_str());
   }
   double time = 0;
-  if (drawTimeStrip(timeline, report.residency.frames, ImGui::GetContentRegionAvail().y, time)) timeline.seek(time);
+  const std::vector<std::uint8_t> none;
+  const auto& residency = document.request.scene ? none : report.residency;
+  if (drawTimeStrip(timeline, residency, ImGui::GetContentRegionAvail().y, time)) timeline.seek(time);
   asked.redraw = asked.redraw || ImGui::IsItemActive();
 }
 

@@ -16,7 +16,9 @@ namespace billow::viewer {
 // What there is to tell.
 struct Report {
   std::string deviceName;
-  Residency residency;
+  std::vector<std::uint8_t> residency = {};  // of the first volume's frames, as Streamer::residency() has it
+  Traffic traffic = {};
+  StreamBudgets streaming = {};
   std::uint64_t bytesInUse = 0, budget = 0;
   std::optional<PassTimes> times;
   double pictureMilliseconds = 0;  // between two pictures, on the CPU's clock
@@ -29,6 +31,8 @@ struct Asked {
   bool remakeSpace = false;  // the size of voxels or the light among them has
   bool frameAll = false, resetCamera = false, screenshot = false;
   std::optional<Choice> choice = {};
+  std::optional<std::size_t> regrid = {};       // the volume of which other grids are to be drawn
+  std::optional<std::uint64_t> streaming = {};  // bytes of GPU memory that frames may have
 };
 
 class Panels {
@@ -61,6 +65,7 @@ class Panels {
   void drawSide(Document& document, OrbitCamera& camera, const Report& report, Asked& asked);
   void drawContents(Document& document, Asked& asked);
   void drawLook(Document& document, Asked& asked);
+  void drawGrids(Document& document, Asked& asked);
   void drawLight(Document& document, Asked& asked);
   void drawDrawing(Document& document, const Report& report, Asked& asked);
   void drawCamera(OrbitCamera& camera, Asked& asked);
@@ -81,11 +86,13 @@ class Panels {
 };
 
 // In panel_strips.cpp.
-// Frames of the time line, those that are resident in another colour, and the time; true where the user takes it
-// elsewhere, which is then in `time`.
-bool drawTimeStrip(const Timeline& timeline, const std::vector<bool>& resident, float height, double& time);
+// Frames of the time line, coloured by the detail in which they are resident, and the time; true where the user takes
+// it elsewhere, which is then in `time`.
+bool drawTimeStrip(const Timeline& timeline, const std::vector<std::uint8_t>& residency, float height, double& time);
+// The frames alone.
+void drawFrames(const std::vector<std::uint8_t>& residency);
 // Where the bytes are and what the passes take.
-void drawResidency(const Report& report);
+void drawResidency(const Report& report, Asked& asked);
 void drawTimes(const Report& report);
 
 }  // namespace billow::viewer

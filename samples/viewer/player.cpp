@@ -1,149 +1,187 @@
 #include "player.h"
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
 namespace billow::viewer {
 namespace {
 
-constexpr std::uint32_t kAhead = 6;   // frames that are loaded before they are due
-constexpr float kLeastShare = 1e-4f;  // of a frame in a moment; less is not worth a frame
+constexpr double kSettling = 0.5;  // seconds without a change after which nothing more is expected
+// Until what planning says is of this moment: updates while it moves, seconds without a change while it stands.
+constexpr std::uint32_t kTelling = 3;
+constexpr double kQuiet = 0.25;
+constexpr double kWatching = 0.5;                                // seconds between two looks at the packs' files
+constexpr std::uint64_t kLeastRing = 64 << 10, kRing = 8 << 20;  // of staging, bytes
+
+bool sameLayers(const runtime::Drawable& a, const runtime::Drawable& b) {
+  return a.count == b.count && std::equal(a.layers.begin(), a.layers.begin() + a.count, b.layers.begin(),
+                                          [](const runtime::Layer& x, const runtime::Layer& y) {
+                                            return x.frame == y.frame && x.weight == y.weight && x.advect == y.advect;
+                                          });
+}
 
 }  // namespace
 
-Player::Player(runtime::Renderer& renderer, const command::Contents& contents, std::uint64_t budget,
-               std::uint32_t framesInFlight, Interpolation interpolation)
-    : renderer_(renderer),
-      contents_(contents),
-      budget_(budget),
-      framesInFlight_(framesInFlight),
-      interpolation_(interpolation),
-      volumes_(contents.volumes().size()),
-      shown_(contents.volumes().size()) {}
-
-const std::vector<runtime::Drawable>& Player::update(double time, double velocity) {
-  ++updates_;
-  for (std::size_t i = 0; i < volumes_.size(); ++i) {
-    runtime::Drawable next = drawableOf(i, time);
-    if (next.held) {
-      next = shown_[i];
-      next.held = true;
-      ++late_;
-    }
-    touch(next);
-    shown_[i] = next;
+command::Checked<std::unique_ptr<Player>> Player::make(runtime::Renderer& renderer, const command::Contents& contents,
+                                                       const command::RenderRequest& request,
+                                                       const StreamBudgets& budgets, std::uint32_t framesInFlight) {
+  std::unique_ptr<Player> player(new Player(contents, request, budgets));
+  auto streamer = runtime::Streamer::create(renderer, {.gpuBudget = budgets.gpu,
+                                                       .cpuBudget = budgets.cpu,
+                                                       .stagingBytes = std::clamp(budgets.cpu / 4, kLeastRing, kRing),
+                                                       .framesInFlight = framesInFlight});
+  if (!streamer) return tl::unexpected(command::toRefusal(streamer.error(), ""));
+  player->streamer_ = std::move(*streamer);
+  for (std::size_t i = 0; i < contents.volumes().size(); ++i) {
+    if (auto opened = player->open(contents.volumes()[i]); !opened) return tl::unexpected(opened.error());
+    const auto instance = player->addInstance(i, {});
+    if (!instance) return tl::unexpected(command::toRefusal(instance.error(), contents.volumes()[i].request->pack));
+    player->tracks_.push_back({.instance = *instance, .next = {}, .clock = {}});
   }
-  prefetch(time, velocity);
-  return shown_;
+  player->drawables_.resize(player->tracks_.size());
+  return player;
 }
 
-// Held where a frame that it needs is not there.
-runtime::Drawable Player::drawableOf(std::size_t volume, double time) {
-  runtime::Drawable drawable;
-  for (const command::FrameShare& share : contents_.volumes()[volume].framesAt(time, interpolation_)) {
-    if (share.weight < kLeastShare) continue;
-    const runtime::Frame* frame = load(volume, share.frame);
-    drawable.held |= frame == nullptr;
-    drawable.layers[drawable.count++] = {frame, share.weight, share.advect};
-  }
-  if (drawable.count == 1) drawable.layers[0] = {.frame = drawable.layers[0].frame};
-  return drawable;
+command::Checked<void> Player::open(const command::PlacedVolume& volume) {
+  const std::string& path = volume.request->pack;
+  if (assets_.contains(path)) return {};
+  const auto asset = streamer_->open({.path = path});
+  if (!asset) return tl::unexpected(command::toRefusal(asset.error(), path));
+  assets_.emplace(path, Asset{*asset, FileWatch(path), streamer_->pack(*asset)});
+  return {};
 }
 
-// One frame that is due soon.
-void Player::prefetch(double time, double velocity) {
-  waiting_ = false;
-  for (std::size_t i = 0; i < volumes_.size() && bytes() < budget_ / 2; ++i) {
-    const command::PlacedVolume& placed = contents_.volumes()[i];
-    const auto shown = placed.framesAt(time, Interpolation::hold);
-    const std::uint32_t count = placed.record().frameCount;
-    if (shown.empty() || placed.still) continue;
-    for (std::uint32_t ahead = 1; ahead <= std::min(kAhead, count - 1); ++ahead) {
-      const std::uint32_t frame = (shown[0].frame + (velocity < 0 ? count - ahead : ahead)) % count;
-      if (volumes_[i].residents.contains(frame) || volumes_[i].failed.contains(frame)) continue;
-      load(i, frame);
-      waiting_ = true;
-      return;
-    }
-  }
-}
-
-// Null where it cannot be loaded, which is told once.
-const runtime::Frame* Player::load(std::size_t volume, std::uint32_t frame) {
-  Volume& known = volumes_[volume];
-  if (const auto found = known.residents.find(frame); found != known.residents.end()) {
-    found->second.used = updates_;
-    return found->second.frame.get();
-  }
-  if (known.failed.contains(frame)) return nullptr;
+runtime::Result<runtime::InstanceId> Player::addInstance(std::size_t volume, const Clock& clock) {
   const command::PlacedVolume& placed = contents_.volumes()[volume];
-  runtime::GridChoice grids = placed.grids;
-  if (interpolation_ == Interpolation::advect) grids = runtime::withVelocity(*placed.pack, placed.record(), grids);
-  while (bytes() > budget_ && makeRoom()) {
+  return streamer_->addInstance({.asset = assets_.at(placed.request->pack).id,
+                                 .volume = placed.number,
+                                 .grids = placed.grids,
+                                 .time = clock.time,
+                                 .playback = clock.playback,
+                                 .objectToWorld = placed.request->transform,
+                                 .priority = clock.wanted ? 1.0f : 0.0f});
+}
+
+void Player::update(const Timeline& timeline, double seconds, const Seen& seen) {
+  const bool jumped = follow(timeline);
+  // Who has been sent to this moment is there.
+  streamer_->update({.seconds = jumped ? 0 : seconds, .view = seen.view, .pixelsHigh = seen.pixelsHigh});
+  const auto now = std::chrono::steady_clock::now();
+  const std::chrono::duration<double> passed = now - std::exchange(updated_, now);
+  traffic_.add(streamer_->stats(), passed.count());
+  swapGrids();
+  look();
+  updates_ = jumped ? 0 : updates_ + 1;
+  moving_ = timeline.velocity() != 0;
+  quiet_ = jumped || changed_ ? 0 : quiet_ + seconds;
+  watch(seconds);
+}
+
+// Tells the streamer where everything is to be; true where that does not follow from where it was.
+bool Player::follow(const Timeline& timeline) {
+  // A scene's loop is none of its volumes' own.
+  bool jumped = seeks_ != timeline.seeks() || (request_.scene && jumps_ != timeline.jumps());
+  seeks_ = timeline.seeks();
+  jumps_ = timeline.jumps();
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    const Clock clock = clockOf(contents_.volumes()[i], request_, timeline);
+    jumped |= clock.part != tracks_[i].clock.part;
+    tracks_[i].clock = clock;
   }
-  for (;;) {
-    auto made = renderer_.upload(*placed.pack, placed.number, frame, {.grids = grids});
-    if (made) {
-      uploadValue_ = std::max(uploadValue_, (*made)->uploadValue());
-      return (known.residents[frame] = {std::move(*made), updates_}).frame.get();
+  for (const Track& track : tracks_) {
+    for (const runtime::InstanceId instance : {track.instance, track.next}) {
+      streamer_->setPlayback(instance, track.clock.playback);
+      streamer_->setPriority(instance, track.clock.wanted ? 1.0f : 0.0f);
+      if (jumped) streamer_->seek(instance, track.clock.time);
     }
-    if (made.error().code == runtime::ErrorCode::budget && makeRoom()) continue;
-    known.failed.insert(frame);
-    errors_.push_back(command::toRefusal(made.error(), placed.request->pack).message);
-    return nullptr;
+  }
+  return jumped;
+}
+
+// What draws other grids takes its place when it draws something, so that no picture is without.
+void Player::swapGrids() {
+  for (Track& track : tracks_) {
+    if (track.next == runtime::InstanceId{} || streamer_->drawable(track.next).count == 0) continue;
+    streamer_->removeInstance(std::exchange(track.instance, std::exchange(track.next, {})));
   }
 }
 
-// Lets the frame go that was not drawn for longest; false where all are in use.
-bool Player::makeRoom() {
-  Volume* from = nullptr;
-  std::uint32_t oldest = 0;
-  std::uint64_t used = updates_ > framesInFlight_ ? updates_ - framesInFlight_ : 0;
-  for (Volume& volume : volumes_) {
-    for (const auto& [number, resident] : volume.residents) {
-      if (resident.used >= used) continue;
-      from = &volume;
-      oldest = number;
-      used = resident.used;
-    }
-  }
-  if (from != nullptr) from->residents.erase(oldest);
-  return from != nullptr;
-}
-
-// What is drawn now stays.
-void Player::touch(const runtime::Drawable& drawable) {
-  for (Volume& volume : volumes_) {
-    for (auto& [number, resident] : volume.residents) {
-      for (std::uint32_t i = 0; i < drawable.count; ++i) {
-        if (drawable.layers[i].frame == resident.frame.get()) resident.used = updates_;
-      }
-    }
+void Player::look() {
+  changed_ = false;
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    runtime::Drawable drawable;
+    if (tracks_[i].clock.shown) drawable = streamer_->drawable(tracks_[i].instance);
+    changed_ |= !sameLayers(drawable, drawables_[i]);
+    drawables_[i] = drawable;
   }
 }
 
-std::uint64_t Player::bytes() const {
-  std::uint64_t sum = 0;
-  for (const Volume& volume : volumes_) {
-    for (const auto& [number, resident] : volume.residents) sum += resident.frame->stats().allocatedBytes;
+void Player::watch(double seconds) {
+  for (auto& [path, asset] : assets_) {
+    const format::Pack* pack = streamer_->pack(asset.id);
+    renewed_ |= pack != asset.pack;
+    asset.pack = pack;
   }
-  return sum;
+  unwatched_ += seconds;
+  if (unwatched_ < kWatching) return;
+  unwatched_ = 0;
+  for (auto& [path, asset] : assets_) {
+    asset.stale |= asset.file.changed();
+    // Not while it is being reloaded: once more then.
+    if (asset.stale && streamer_->reload(asset.id, {.path = path})) asset.stale = false;
+  }
 }
 
-Residency Player::residency() const {
-  Residency residency{.frames = {}, .bytes = bytes(), .resident = 0, .late = late_};
-  for (const Volume& volume : volumes_) residency.resident += static_cast<std::uint32_t>(volume.residents.size());
-  if (volumes_.empty()) return residency;
-  residency.frames.resize(contents_.volumes()[0].record().frameCount);
-  for (const auto& [number, resident] : volumes_[0].residents) residency.frames[number] = true;
-  return residency;
+bool Player::complete() const {
+  const runtime::StreamStats& stats = traffic_.now();
+  const bool all = std::accumulate(stats.missingBricks.begin(), stats.missingBricks.end(), std::uint64_t{0}) == 0;
+  const bool sharp = std::none_of(drawables_.begin(), drawables_.end(),
+                                  [](const runtime::Drawable& shown) { return shown.held || shown.coarse; });
+  const bool told = moving_ ? updates_ >= kTelling : quiet_ >= kQuiet;
+  return told && all && sharp && stats.instancesEmpty == 0;
+}
+
+bool Player::waiting() const {
+  const runtime::StreamStats& stats = traffic_.now();
+  return quiet_ < kSettling || stats.loadsReading + stats.loadsDecoding + stats.loadsUploading > 0;
+}
+
+void Player::regrid(std::size_t volume) {
+  Track& track = tracks_[volume];
+  streamer_->removeInstance(track.next);
+  const auto next = addInstance(volume, track.clock);
+  track.next = next.value_or(runtime::InstanceId{});
+  if (!next) errors_.push_back(next.error().message);
+  // It has missed what the other played since.
+  seeks_.reset();
+}
+
+void Player::setBudgets(const StreamBudgets& budgets) {
+  budgets_ = budgets;
+  streamer_->setBudget(budgets.gpu, budgets.cpu);
+  quiet_ = 0;
+}
+
+std::vector<std::uint8_t> Player::residency() const {
+  if (tracks_.empty()) return {};
+  std::vector<std::uint8_t> frames(contents_.volumes()[0].record().frameCount);
+  streamer_->residency(tracks_[0].instance, frames);
+  return frames;
 }
 
 std::optional<std::string> Player::takeError() {
-  if (errors_.empty()) return std::nullopt;
-  std::string error = std::move(errors_.front());
-  errors_.pop_front();
-  return error;
+  if (!errors_.empty()) {
+    std::string error = std::move(errors_.back());
+    errors_.pop_back();
+    return error;
+  }
+  const auto error = streamer_->takeError();
+  if (!error) return std::nullopt;
+  for (const auto& [path, asset] : assets_) {
+    if (asset.id == error->asset) return path + ": " + error->message;
+  }
+  return error->message;
 }
 
 }  // namespace billow::viewer

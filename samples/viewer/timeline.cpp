@@ -10,13 +10,13 @@ Timeline::Timeline(std::vector<Tick> ticks, double end)
     : ticks_(std::move(ticks)), end_(end), time_(ticks_.front().time) {}
 
 void Timeline::advance(double seconds) {
-  if (playing_) wrap(time_ + seconds * velocity());
+  if (playing_) wrap(std::min(time_, last()) + seconds * velocity());
 }
 
 // Takes a time that may lie outside back to where the loop leads.
 void Timeline::wrap(double time) {
-  const double length = end_ - begin();
-  if (time >= begin() && time < end_) {
+  const double length = last() - begin();
+  if (time >= begin() && time < last()) {
     time_ = time;
     return;
   }
@@ -26,9 +26,10 @@ void Timeline::wrap(double time) {
     time_ = time < begin() ? begin() : ticks_.back().time;
     return;
   }
-  double offset = std::fmod(time - begin(), loop_ == Loop::loop ? length : 2 * length);
-  if (offset < 0) offset += loop_ == Loop::loop ? length : 2 * length;
-  if (offset >= length) {  // of ping-pong alone: on the way back
+  const double period = loop_ == Loop::loop ? length : 2 * length;
+  double offset = period > 0 ? std::fmod(time - begin(), period) : 0;
+  if (offset < 0) offset += period;
+  if (offset > length) {  // of ping-pong alone: on the way back
     offset = 2 * length - offset;
     forward_ = !forward_;
   }
@@ -46,6 +47,7 @@ void Timeline::play() {
 void Timeline::seek(double time) {
   time_ = std::clamp(time, begin(), std::nextafter(end_, begin()));
   ++jumps_;
+  ++seeks_;
 }
 
 void Timeline::step(int ticks) {
@@ -63,6 +65,18 @@ void Timeline::setSpeed(double speed) {
 void Timeline::setLoop(Loop loop) {
   loop_ = loop;
   forward_ = true;
+  ++jumps_;
+  ++seeks_;
+}
+
+void Timeline::goOnAs(const Timeline& other) {
+  speed_ = other.speed_;
+  loop_ = other.loop_;
+  playing_ = other.playing_;
+  forward_ = other.forward_;
+  jumps_ = other.jumps_;
+  seeks_ = other.seeks_;
+  seek(other.time_);
 }
 
 std::size_t Timeline::tick() const {

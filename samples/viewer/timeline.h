@@ -16,6 +16,7 @@ using runtime::Loop;
 struct Tick {
   double time;          // seconds
   std::int32_t number;  // of the frame, as the user counts
+  bool operator==(const Tick&) const = default;
 };
 
 inline constexpr double kMostSpeed = 4;
@@ -33,13 +34,17 @@ class Timeline {
   void step(int ticks);         // pauses; round the end, but for `once`
   void setSpeed(double speed);  // clamped to [-kMostSpeed, kMostSpeed]
   void setLoop(Loop loop);
+  // Plays as the other does, from where it is.
+  void goOnAs(const Timeline& other);
+  // Whether it has the same ticks.
+  bool sameTicks(const Timeline& other) const { return ticks_ == other.ticks_ && end_ == other.end_; }
 
   bool playing() const { return playing_; }
   double time() const { return time_; }
   double begin() const { return ticks_.front().time; }
   double end() const { return end_; }
   double speed() const { return speed_; }
-  // The speed with the direction in which ping-pong now goes; 0 while paused.
+  // The speed with the direction in which ping-pong, which turns at the last tick, now goes; 0 while paused.
   double velocity() const { return playing_ ? speed_ * (forward_ ? 1 : -1) : 0; }
   Loop loop() const { return loop_; }
   const std::vector<Tick>& ticks() const { return ticks_; }
@@ -47,9 +52,13 @@ class Timeline {
   std::size_t tick() const;
   // Counts seeks, steps and turns: what cannot be foreseen from velocity().
   std::uint32_t jumps() const { return jumps_; }
+  // Of those, what does not come of the loop either.
+  std::uint32_t seeks() const { return seeks_; }
 
  private:
   void wrap(double time);
+  // The end of what the loop plays.
+  double last() const { return loop_ == Loop::pingPong ? ticks_.back().time : end_; }
 
   std::vector<Tick> ticks_;
   double end_;
@@ -58,7 +67,7 @@ class Timeline {
   Loop loop_ = Loop::loop;
   bool playing_ = true;
   bool forward_ = true;
-  std::uint32_t jumps_ = 0;
+  std::uint32_t jumps_ = 0, seeks_ = 0;
 };
 
 }  // namespace billow::viewer

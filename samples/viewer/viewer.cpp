@@ -12,14 +12,14 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
-#include <system_error>
+#include <utility>
 
 #include "command.h"
 #include "orbit.h"
 #include "painter.h"
 #include "panels.h"
-#include "render_image.h"
 #include "screen.h"
+#include "shots.h"
 #include "window.h"
 
 namespace billow::viewer {
@@ -53,6 +53,10 @@ std::unique_ptr<headless::Headless> openDevice(const Window& window, std::option
   return valueOf(headless::Headless::create(options));
 }
 
+StreamBudgets budgetsOf(const ViewOptions& options) {
+  return {.gpu = options.frameBudget.value_or(options.gpuBudget / 2), .cpu = options.cpuBudget};
+}
+
 class Viewer {
  public:
   Viewer(const ViewOptions& options, std::unique_ptr<Document> document)
@@ -63,7 +67,8 @@ class Viewer {
         gpu_(openDevice(window_, options.device)),
         screen_(gpu_->device(), window_.makeSurface(gpu_->host().instance)),
         canvas_(gpu_->device()),
-        painter_(*gpu_, options.gpuBudget) {
+        painter_(*gpu_, options.gpuBudget, budgetsOf(options)),
+        shots_(options.screenshots) {
     take(std::move(document));
   }
 
@@ -86,7 +91,8 @@ class Viewer {
 
  private:
   bool idle() const {
-    return settling_ == 0 && !redraw_ && !painter_.waiting() && document_->timeline->velocity() == 0;
+    const bool waiting = painter_.player() != nullptr && painter_.player()->waiting();
+    return settling_ == 0 && !redraw_ && !shots_.asked() && !waiting && document_->timeline->velocity() == 0;
   }
 
   void take(std::unique_ptr<Document> document) {
@@ -121,14 +127,24 @@ class Viewer {
   void picture(VkExtent2D pixels, const Input& input, double passed) {
     ImGui_ImplVulkan_NewFrame();
     ImGui_ImplGlfw_NewFrame();
+    if (input.released) released_ = input.released;
+    if (released_) {
+      // While a slow picture was drawn the pointer has gone on: what it held was let go there.
+      ImGui::GetIO().MousePos = {static_cast<float>((*released_)[0]), static_cast<float>((*released_)[1])};
+    }
     ImGui::NewFrame();
+    if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) released_.reset();
     if (!camera_) {
       place();
       resetCamera();
     }
+    if (painter_.player() != nullptr && painter_.player()->takeRenewed()) renew();
     const std::uint32_t jumps = document_->timeline->jumps();
     take(input);
-    document_->timeline->advance(std::clamp(passed, 0.0, kMostSeconds));
+    // What stands may have waited for long; what plays makes no leap.
+    const double seconds = document_->timeline->playing() ? std::clamp(passed, 0.0, kMostSeconds) : passed;
+    document_->timeline->advance(seconds);
+    unplayed_ += seconds;
     const Asked asked = panels_.draw(*document_, *camera_, report(passed));
     window_.setPicture(panels_.picture(), panels_.covered());
     window_.setTyping(panels_.typing());
@@ -153,12 +169,16 @@ class Viewer {
 
   Report report(double passed) const {
     Report report{.deviceName = gpu_->deviceName(),
-                  .residency = painter_.residency(),
                   .bytesInUse = painter_.bytesInUse(),
                   .budget = painter_.budget(),
                   .times = painter_.times(),
                   .pictureMilliseconds = idle() ? 0 : passed * 1000,
                   .voxelSize = painter_.voxelSize()};
+    if (const Player* player = painter_.player()) {
+      report.residency = player->residency();
+      report.traffic = player->traffic();
+      report.streaming = player->budgets();
+    }
     return report;
   }
 
@@ -214,15 +234,42 @@ class Viewer {
 
   void obey(const Asked& asked) {
     if (asked.choice) return open(document_->path(), asked.choice);
-    if (asked.remakeSpace) {
-      if (const auto done = painter_.remakeSpace(*document_); !done) panels_.complain(done.error().message);
+    if (asked.regrid) regrid(*asked.regrid);
+    if (asked.streaming && painter_.player() != nullptr) {
+      painter_.player()->setBudgets({.gpu = *asked.streaming, .cpu = options_.cpuBudget});
     }
+    if (asked.remakeSpace) remakeSpace();
     if (asked.frameAll) {
       camera_->frame(document_->stage().box, double{1} * document_->request.width / document_->request.height);
     }
     if (asked.resetCamera) resetCamera();
-    shoot_ |= asked.screenshot;
+    if (asked.screenshot) shots_.ask(glfwGetTime());
     redraw_ |= asked.remakeSpace || asked.frameAll || asked.screenshot;
+  }
+
+  void remakeSpace() {
+    if (const auto done = painter_.remakeSpace(*document_); !done) panels_.complain(done.error().message);
+    redraw_ = true;
+  }
+
+  // Looks, extent and time line of the document, after its grids or its packs have become others.
+  void renew() {
+    if (const auto done = document_->renew(); !done) panels_.complain(done.error().message);
+    remakeSpace();
+  }
+
+  void regrid(std::size_t volume) {
+    renew();
+    if (painter_.player() != nullptr) painter_.player()->regrid(volume);
+  }
+
+  // Goes on to the moment of the time line, with what has arrived.
+  void stream() {
+    painter_.update(std::exchange(unplayed_, 0), {.view = camera_->view(), .pixelsHigh = canvas_.size().height});
+    Player* player = painter_.player();
+    if (player == nullptr) return;
+    redraw_ |= player->changed();
+    while (const auto error = player->takeError()) panels_.complain(*error);
   }
 
   runtime::DrawInfo describe(bool opaque) const {
@@ -247,10 +294,8 @@ class Viewer {
     painter_.readTimes(screen_.slot());
     std::string& title = titles_[screen_.slot()];
     if (!title.empty()) window_.setTitle(title);
-    const Timeline& timeline = *document_->timeline;
-    painter_.update(timeline.time(), timeline.velocity());
-    while (const auto error = painter_.takeError()) panels_.complain(*error);
-    if (shoot_) shoot();
+    stream();
+    if (shots_.due(painter_.player(), glfwGetTime())) shoot();
     if (redraw_) {
       const auto done = painter_.paint(commands, canvas_, describe(true), screen_.slot());
       if (done) {
@@ -263,32 +308,21 @@ class Viewer {
     redraw_ = false;
     const PictureSource source{painted_ ? canvas_.shown() : VK_NULL_HANDLE, canvas_.size(), place_};
     screen_.end(source, ImGui::GetDrawData(), painter_.wait());
+    const Timeline& timeline = *document_->timeline;
     title = fmt::format("{} - frame {} - {} - billow", document_->name(), timeline.ticks()[timeline.tick()].number,
                         timeline.playing() ? "playing" : "paused");
   }
 
-  // The picture without panels, to a file that is not there yet.
+  // The picture without panels.
   void shoot() {
-    shoot_ = false;
     const auto picture = painter_.picture(describe(!panels_.exr()));
     if (!picture) return panels_.complain(picture.error().message);
     const Timeline& timeline = *document_->timeline;
-    const std::filesystem::path folder(options_.screenshots);
     const std::string stem = fmt::format("{}_{:04}", std::filesystem::path(document_->path()).stem().string(),
                                          timeline.ticks()[timeline.tick()].number);
-    const char* extension = panels_.exr() ? ".exr" : ".png";
-    std::filesystem::path path = folder / (stem + extension);
-    std::error_code ignored;
-    for (int i = 2; std::filesystem::exists(path, ignored); ++i) {
-      path = folder / fmt::format("{}_{}{}", stem, i, extension);
-    }
-    try {
-      command::writeWhole(path.string(), panels_.exr() ? command::encodeExr(*picture)
-                                                       : command::encodePng(*picture, document_->request.exposure));
-      panels_.tell("Picture in " + path.string(), ImGui::GetTime());
-    } catch (const std::exception& error) {
-      panels_.complain(error.what());
-    }
+    const auto path = shots_.write(*picture, stem, panels_.exr(), document_->request.exposure);
+    if (!path) return panels_.complain(path.error().message);
+    panels_.tell("Picture in " + *path, ImGui::GetTime());
   }
 
   const ViewOptions& options_;
@@ -300,14 +334,16 @@ class Viewer {
   Canvas canvas_;
   std::unique_ptr<Document> document_;
   Painter painter_;
+  Shots shots_;
   std::optional<OrbitCamera> camera_;
   VkRect2D place_{};
   std::array<std::string, kFramesInFlight> titles_;  // of the pictures in flight: the window's tells what it shows
+  std::optional<std::array<double, 2>> released_;
   double last_ = 0;
+  double unplayed_ = 0;  // seconds that the time line has advanced since the last update of the frames
   int settling_ = kSettling;
   bool redraw_ = true;    // the picture does not show what it should
   bool painted_ = false;  // the canvas has one
-  bool shoot_ = false;
 };
 
 }  // namespace

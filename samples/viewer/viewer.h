@@ -13,9 +13,11 @@ namespace billow::viewer {
 struct ViewOptions {
   std::string path;                          // a pack or a scene
   std::optional<Choice> choice;              // of a pack
-  std::uint32_t width = 1280, height = 800;  // of the window
+  std::uint32_t width = 1280, height = 920;  // of the window
   std::string screenshots = ".";             // folder to which F12 writes
   std::uint64_t gpuBudget = std::uint64_t{1} << 30;
+  std::optional<std::uint64_t> frameBudget;  // of it, for frames; default: half
+  std::uint64_t cpuBudget = std::uint64_t{64} << 20;
   std::optional<std::uint32_t> device;
 };
 

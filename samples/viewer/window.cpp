@@ -133,6 +133,7 @@ void Window::onButton(int button, int action, int mods) {
   input_.any = true;
   if (action == GLFW_RELEASE) {
     if (button == dragButton_) drag_ = Drag::none;
+    if (button == GLFW_MOUSE_BUTTON_LEFT) input_.released = {x_, y_};
     return;
   }
   if (drag_ != Drag::none || !overPicture()) return;

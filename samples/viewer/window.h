@@ -2,7 +2,9 @@
 #ifndef BILLOW_VIEWER_WINDOW_H
 #define BILLOW_VIEWER_WINDOW_H
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,12 +26,13 @@ struct Area {
 // What has happened since it was taken last. Events are counted as they come, so that none is lost between two slow
 // pictures.
 struct Input {
-  std::vector<int> keys;             // GLFW_KEY_..., pressed or repeated, without Control
-  double turnX = 0, turnY = 0;       // pointer moved with the left button held, in window units
-  double panX = 0, panY = 0;         // with the middle one, or Shift and the left one
-  double wheel = 0;                  // steps, above 0 away from the user
-  std::vector<std::string> dropped;  // paths
-  bool any = false;                  // anything at all, of which the panels may want to know
+  std::vector<int> keys;                          // GLFW_KEY_..., pressed or repeated, without Control
+  double turnX = 0, turnY = 0;                    // pointer moved with the left button held, in window units
+  double panX = 0, panY = 0;                      // with the middle one, or Shift and the left one
+  double wheel = 0;                               // steps, above 0 away from the user
+  std::optional<std::array<double, 2>> released;  // where the left button was let go last, window units
+  std::vector<std::string> dropped;               // paths
+  bool any = false;                               // anything at all, of which the panels may want to know
 };
 
 class Window {

@@ -13,41 +13,10 @@ namespace {
 using namespace format;
 using tests::PackImage;
 
-// The sample's volume again as a level: the same trees, in voxels as much longer.
-void addLevel(PackImage& image, std::uint32_t log2) {
-  const VolumeRecord full = image.volumes[0];
-  VolumeRecord level = full;
-  level.name = {static_cast<std::uint32_t>(image.strings.size()), 8};
-  image.strings += "level " + std::to_string(log2);
-  level.name.size = static_cast<std::uint32_t>(image.strings.size()) - level.name.offset;
-  level.firstGrid = static_cast<std::uint32_t>(image.grids.size());
-  level.firstFrame = static_cast<std::uint32_t>(image.frames.size());
-  level.firstGridFrame = static_cast<std::uint32_t>(image.gridFrames.size());
-  const auto number = static_cast<std::uint32_t>(image.volumes.size());
-  image.volumes.push_back(level);
-  image.levels.push_back({0, number, log2, static_cast<std::uint32_t>(image.levelErrors.size())});
-  for (std::uint32_t g = 0; g < full.gridCount; ++g) {
-    image.grids.push_back(image.grids[g]);
-    image.grids.back().volume = number;
-  }
-  for (std::uint32_t f = 0; f < full.frameCount; ++f) image.frames.push_back(image.frames[f]);
-  const double factor = static_cast<double>(1u << log2);
-  for (std::uint32_t i = 0; i < full.gridCount * full.frameCount; ++i) {
-    GridFrame frame = image.gridFrames[i];
-    for (int row = 0; row < 3 && (frame.flags & kGridPresent) != 0; ++row) {
-      double* m = frame.indexToWorld + 4 * row;
-      m[3] += (m[0] + m[1] + m[2]) * (factor - 1) / 2;
-      for (int axis = 0; axis < 3; ++axis) m[axis] *= factor;
-    }
-    image.gridFrames.push_back(frame);
-    image.levelErrors.push_back({0.5 * (i + 1), 0.25f, 0});
-  }
-}
-
 PackImage withLevels() {
   PackImage image = PackImage::of(tests::sample());
-  addLevel(image, 1);
-  addLevel(image, 3);
+  tests::addLevel(image, 1);
+  tests::addLevel(image, 3);
   return image;
 }
 

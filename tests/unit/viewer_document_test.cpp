@@ -16,14 +16,14 @@ namespace {
 
 using nlohmann::json;
 
-// Three frames of a volume, a quarter of a second apart, and an effect of a second.
-std::vector<std::byte> smokeAndEffect() {
-  return tests::writePack({.effects = true}, [](format::PackWriter& writer) {
-    format::PackTables tables = tests::sampleTables("smoke", {"density"}, 3);
+// Frames of a volume, and an effect of a second.
+std::vector<std::byte> smokeAndEffect(std::uint32_t frames = 3) {
+  return tests::writePack({.effects = true}, [&](format::PackWriter& writer) {
+    format::PackTables tables = tests::sampleTables("smoke", {"density"}, frames);
     tables.effects = tests::plainEffect();
     tables.effects.effects[0].name = tables.addString("balls");
     tables.effects.emitters[0].name = tables.addString("emitter");
-    for (std::uint32_t frame = 0; frame < 3; ++frame) {
+    for (std::uint32_t frame = 0; frame < frames; ++frame) {
       tests::GridFrameBuilder builder(writer, 0);
       builder.brick({10, 10, 10}, format::kEncodingConstant, {}, 1 + static_cast<float>(frame), 0, format::kMaskAll);
       tables.gridFrames.push_back(builder.finish(tables));
@@ -139,6 +139,33 @@ TEST_F(ViewerDocument, CopiedMembersDrawTheSame) {
   EXPECT_EQ(first.ambient, second.ambient);
   EXPECT_EQ(first.scatteringOrders, second.scatteringOrders);
   EXPECT_EQ(first.temperatureOffset, second.temperatureOffset);
+}
+
+// Other grids or other packs: what is drawn changes, where the time line is does not.
+TEST_F(ViewerDocument, RenewedItKeepsItsTime) {
+  const auto document = open(pack_);
+  document->timeline->seek(0.06);
+  document->timeline->setSpeed(-2);
+  document->request.volumes[0].grids.extinction = "none";
+  ASSERT_TRUE(document->renew());
+  EXPECT_EQ(document->contents().volumes()[0].grids.extinction, format::kNone);
+  EXPECT_EQ(document->timeline->time(), 0.06);
+
+  document->request.volumes[0].grids.extinction = "fog";
+  const auto refused = document->renew();
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("fog"), std::string::npos);
+  EXPECT_EQ(document->contents().volumes()[0].grids.extinction, format::kNone) << "all is as it was";
+  EXPECT_EQ(document->timeline->ticks().size(), 3u);
+
+  document->request.volumes[0].grids = {};
+  const std::vector<std::byte> longer = smokeAndEffect(5);
+  std::ofstream(pack_, std::ios::binary)
+      .write(reinterpret_cast<const char*>(longer.data()), static_cast<std::streamsize>(longer.size()));
+  ASSERT_TRUE(document->renew());
+  EXPECT_EQ(document->timeline->ticks().size(), 5u);
+  EXPECT_EQ(document->timeline->time(), 0.06);
+  EXPECT_EQ(document->timeline->speed(), -2);
 }
 
 TEST_F(ViewerDocument, ResetTakesBackEveryChangeOfTheLook) {

@@ -38,19 +38,29 @@ TEST(Timeline, LoopsRoundInBothDirections) {
   EXPECT_NEAR(timeline.time(), 1.4, 1e-9);
 }
 
+// As runtime::Loop::pingPong does: at the beginnings of the first and last frames.
 TEST(Timeline, TurnsAtBothEndsOfPingPong) {
   Timeline timeline = quarters();
   timeline.setLoop(Loop::pingPong);
-  timeline.advance(0.9);
+  timeline.advance(0.7);
   timeline.advance(0.2);
-  EXPECT_NEAR(timeline.time(), 1.9, 1e-12);
+  EXPECT_NEAR(timeline.time(), 1.6, 1e-12);
   EXPECT_EQ(timeline.velocity(), -1);
   timeline.advance(1.0);
-  EXPECT_NEAR(timeline.time(), 1.1, 1e-12);
+  EXPECT_NEAR(timeline.time(), 1.4, 1e-12);
   EXPECT_EQ(timeline.velocity(), 1);
-  timeline.advance(2.5);  // to the end, back, and on
-  EXPECT_NEAR(timeline.time(), 1.6, 1e-9);
+  timeline.advance(1.75);  // to the end, back, and on
+  EXPECT_NEAR(timeline.time(), 1.65, 1e-9);
   EXPECT_EQ(timeline.velocity(), 1);
+  timeline.seek(1.9);  // which no ping-pong passes
+  timeline.advance(0.1);
+  EXPECT_NEAR(timeline.time(), 1.65, 1e-9);
+  EXPECT_EQ(timeline.velocity(), -1);
+
+  Timeline still({{1, 7}}, 2);
+  still.setLoop(Loop::pingPong);
+  still.advance(0.3);
+  EXPECT_EQ(still.time(), 1);
 }
 
 // However long a picture takes, what shows is a moment of the sequence.
@@ -137,6 +147,9 @@ TEST(Timeline, CountsWhatCannotBeForeseen) {
   EXPECT_EQ(timeline.jumps(), 1u);
   timeline.advance(0.7);
   EXPECT_EQ(timeline.jumps(), 2u);
+  EXPECT_EQ(timeline.seeks(), 1u) << "the loop leads back by itself";
+  timeline.setLoop(Loop::pingPong);
+  EXPECT_EQ(timeline.seeks(), 2u);
 }
 
 }  // namespace

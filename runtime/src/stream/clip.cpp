@@ -100,35 +100,21 @@ bool hasVelocity(const format::Pack& pack, const format::VolumeRecord& volume) {
 }
 
 void addLevels(const format::Pack& pack, std::uint32_t volume, Clip& clip) {
-  const auto add = [&](std::uint32_t number) {
+  const auto add = [&](std::uint32_t number, std::uint32_t log2) {
     const format::VolumeRecord& record = pack.volumes()[number];
-    clip.levels.push_back({.volume = number, .grids = chooseGrids(pack, record), .voxel = voxelWidth(pack, record)});
+    clip.levels.push_back(
+        {.volume = number, .grids = chooseGrids(pack, record), .log2 = log2, .voxel = voxelWidth(pack, record)});
   };
-  add(volume);
+  add(volume, 0);
   for (const format::LevelRecord& level : pack.levelsOf(volume)) {
     // Means are as coarse as that, and smaller than a tree.
-    if (level.log2 < kMeansLog2) add(level.level);
+    if (level.log2 < kMeansLog2) add(level.level, level.log2);
   }
   ClipLevel means = clip.levels.front();
   means.means = true;
+  means.log2 = kMeansLog2;
   means.voxel *= 1 << kMeansLog2;
   clip.levels.push_back(means);
-}
-
-std::shared_ptr<const Clip> makeClip(const std::shared_ptr<OpenPack>& open, AssetId asset, std::uint32_t volume) {
-  const format::Pack& pack = open->pack;
-  const format::VolumeRecord& record = pack.volumes()[volume];
-  if (record.frameCount == 0 || pack.isLevel(volume)) return nullptr;
-  auto clip = std::make_shared<Clip>();
-  clip->pack = open;
-  clip->asset = asset;
-  clip->volume = volume;
-  clip->timeline = Timeline(pack.framesOf(record), record.framesPerSecond);
-  clip->same = equalFrames(pack, record);
-  clip->velocity = hasVelocity(pack, record);
-  addLevels(pack, volume, *clip);
-  findBounds(pack, record, *clip);
-  return clip;
 }
 
 }  // namespace
@@ -154,12 +140,35 @@ std::uint64_t Clip::bricks(std::uint32_t item) const {
   return count;
 }
 
+std::shared_ptr<const Clip> makeClip(const std::shared_ptr<OpenPack>& open, AssetId asset, std::uint32_t volume) {
+  const format::Pack& pack = open->pack;
+  const format::VolumeRecord& record = pack.volumes()[volume];
+  if (record.frameCount == 0) return nullptr;
+  auto clip = std::make_shared<Clip>();
+  clip->pack = open;
+  clip->asset = asset;
+  clip->volume = volume;
+  clip->timeline = Timeline(pack.framesOf(record), record.framesPerSecond);
+  clip->same = equalFrames(pack, record);
+  clip->velocity = hasVelocity(pack, record);
+  addLevels(pack, volume, *clip);
+  findBounds(pack, record, *clip);
+  return clip;
+}
+
 std::vector<std::shared_ptr<const Clip>> makeClips(const std::shared_ptr<OpenPack>& pack, AssetId asset) {
   std::vector<std::shared_ptr<const Clip>> clips;
   for (std::uint32_t volume = 0; volume < pack->pack.volumes().size(); ++volume) {
-    clips.push_back(makeClip(pack, asset, volume));
+    clips.push_back(pack->pack.isLevel(volume) ? nullptr : makeClip(pack, asset, volume));
   }
   return clips;
+}
+
+std::shared_ptr<const Clip> withGrids(const Clip& clip, const GridChoice& grids) {
+  auto other = std::make_shared<Clip>(clip);
+  // A level has the grids of its volume, in the same order.
+  for (ClipLevel& level : other->levels) level.grids = grids;
+  return other;
 }
 
 }  // namespace billow::runtime

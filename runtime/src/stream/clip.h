@@ -17,7 +17,8 @@ struct ClipLevel {
   std::uint32_t volume = 0;
   GridChoice grids = {};
   bool means = false;
-  double voxel = 1;  // width in the volume's own world
+  std::uint32_t log2 = 0;  // of how many voxels of the volume one of its is wide
+  double voxel = 1;        // width in the volume's own world
 };
 
 // What can be resident is an item: a distinct frame at a level, numbered frame * levels + level.
@@ -45,8 +46,12 @@ struct Clip {
   std::uint64_t bricks(std::uint32_t item) const;
 };
 
+// Null where the volume has no frames. One that is a level of another plays alone.
+std::shared_ptr<const Clip> makeClip(const std::shared_ptr<OpenPack>& pack, AssetId asset, std::uint32_t volume);
 // One for each volume that has frames and is no level of another; null in place of the rest.
 std::vector<std::shared_ptr<const Clip>> makeClips(const std::shared_ptr<OpenPack>& pack, AssetId asset);
+// The same, but for the grids that it draws: they are numbers within its volume.
+std::shared_ptr<const Clip> withGrids(const Clip& clip, const GridChoice& grids);
 
 }  // namespace billow::runtime
 

@@ -81,7 +81,7 @@ tl::unexpected<Error> tooLarge(std::uint64_t bytes) {
 std::uint64_t bookkeepingBytes(const std::vector<std::shared_ptr<const Clip>>& clips) {
   std::uint64_t bytes = 0;
   for (const auto& clip : clips) {
-    if (clip != nullptr) bytes += clip->items() * (sizeof(PlannedItem) + sizeof(Track::Slot)) + clip->frames() * 24ull;
+    if (clip != nullptr) bytes += bookkeepingBytes(*clip);
   }
   return bytes;
 }
@@ -200,6 +200,10 @@ class TableReaderImpl final : public TableReader, public std::enable_shared_from
 };
 
 }  // namespace
+
+std::uint64_t bookkeepingBytes(const Clip& clip) {
+  return clip.items() * (sizeof(PlannedItem) + sizeof(Track::Slot)) + clip.frames() * 24ull;
+}
 
 Result<Opened> openFile(const std::string& path, AssetId asset, Reserve reserve) {
   return guarded<Opened>([&]() -> Result<Opened> {

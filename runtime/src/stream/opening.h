@@ -18,6 +18,9 @@ struct Opened {
   std::uint64_t bytes = 0;                         // reserved of the CPU budget, given back when the pack is closed
 };
 
+// What is kept for a clip, of the CPU budget.
+std::uint64_t bookkeepingBytes(const Clip& clip);
+
 // Reserves bytes of the CPU budget; false where they do not fit.
 struct Reserve {
   Transport& transport;

@@ -179,10 +179,31 @@ Drawable Players::drawable(InstanceId id) const {
   return drawable;
 }
 
-void Players::setSuccessors(AssetId asset, std::span<const std::uint32_t> clips) {
+void Players::residency(InstanceId id, std::span<std::uint8_t> frames) const {
+  std::fill(frames.begin(), frames.end(), kNotResident);
+  const std::uint32_t index = indexOf(id);
+  if (index == format::kNone) return;
+  const Track& track = tracks_[views_[index].clip];
+  const std::size_t count = std::min<std::size_t>(frames.size(), track.clip->frames());
+  for (std::uint32_t frame = 0; frame < count; ++frame) {
+    for (std::uint32_t level = 0; level < track.clip->levelCount(); ++level) {
+      if (track.slots[track.clip->item(frame, level)].frame == nullptr) continue;
+      frames[frame] = static_cast<std::uint8_t>(track.clip->levels[level].log2);
+      break;
+    }
+  }
+}
+
+bool Players::plays(std::uint32_t clip) const {
+  return std::any_of(views_.begin(), views_.end(), [&](const InstanceView& view) { return view.clip == clip; });
+}
+
+void Players::setSuccessors(AssetId asset, std::span<const Succession> successions) {
   for (InstanceView& view : views_) {
-    const Clip& clip = *tracks_[view.clip].clip;
-    if (clip.asset == asset) view.successor = clip.volume < clips.size() ? clips[clip.volume] : format::kNone;
+    if (tracks_[view.clip].clip->asset != asset) continue;
+    const auto found = std::find_if(successions.begin(), successions.end(),
+                                    [&](const Succession& succession) { return succession.clip == view.clip; });
+    view.successor = found == successions.end() ? format::kNone : found->successor;
   }
 }
 

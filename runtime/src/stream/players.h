@@ -49,6 +49,11 @@ struct Player {
 void chooseLayers(Track& track, const InstanceView& view, Player& player, Shown& shown, double moved, float seconds,
                   std::uint64_t update);
 
+// A clip, and the one that is to take its place.
+struct Succession {
+  std::uint32_t clip = 0, successor = format::kNone;
+};
+
 struct RetiredCount {
   std::uint32_t frames = 0;
   std::uint64_t bytes = 0;
@@ -79,8 +84,13 @@ class Players {
   Drawable drawable(InstanceId id) const;
   std::span<const InstanceView> views() const { return views_; }
 
-  // Clips of an asset get successors, by the volumes that instances play; or lose them again.
-  void setSuccessors(AssetId asset, std::span<const std::uint32_t> clips);
+  // By frame, as Streamer::residency() has it.
+  void residency(InstanceId id, std::span<std::uint8_t> frames) const;
+  // Whether an instance plays the clip.
+  bool plays(std::uint32_t clip) const;
+
+  // The instances of an asset get successors of their clips, and lose those that they had.
+  void setSuccessors(AssetId asset, std::span<const Succession> successions);
   // Whether each instance of the asset could draw something of its moment from its successor; they then take their
   // place.
   bool succeed(AssetId asset);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "api.h"
+#include "asset_clips.h"
 #include "checks.h"
 #include "openings.h"
 #include "planning.h"
@@ -25,13 +26,12 @@ struct Asset {
   AssetId id = {};
   Streamer::AssetState state = Streamer::AssetState::opening;
   Opened opened;
-  std::vector<std::uint32_t> clips;  // by volume: numbers of Players, or kNone
+  AssetClips clips;
   // What is to take its place.
   bool reloading = false;
   bool told = false;  // of an error in it
   double waited = 0;  // seconds since it was open
   std::optional<Opened> next;
-  std::vector<std::uint32_t> nextClips;
 };
 
 const char* badField(const StreamConfig& config) {
@@ -131,8 +131,7 @@ class StreamerImpl final : public Streamer {
     const auto found = assets_.find(id.value);
     if (found == assets_.end()) return;
     players_.removeOf(id);
-    closeClips(found->second.clips);
-    closeClips(found->second.nextClips);
+    found->second.clips.close(homeOf(id));
     letGo(std::move(found->second.opened));
     if (found->second.next) letGo(std::move(*found->second.next));
     assets_.erase(found);
@@ -141,17 +140,23 @@ class StreamerImpl final : public Streamer {
   Result<InstanceId> addInstance(const InstanceInfo& info) override {
     return guarded<InstanceId>([&]() -> Result<InstanceId> {
       if (state(info.asset) != AssetState::ready) return failure(ErrorCode::argument, "the asset is not open");
-      const Asset& asset = assets_[info.asset.value];
-      if (info.volume >= asset.clips.size() || asset.clips[info.volume] == format::kNone) {
-        return failure(ErrorCode::argument, "the pack has no volume " + std::to_string(info.volume) + " with frames");
-      }
-      auto id = players_.add(info, asset.clips[info.volume]);
-      if (id && asset.next) players_.setSuccessors(asset.id, asset.nextClips);
+      Asset& asset = assets_[info.asset.value];
+      const auto clip = asset.clips.find(info, asset.opened, nextOf(asset), homeOf(asset.id));
+      if (!clip) return tl::unexpected(clip.error());
+      auto id = players_.add(info, *clip);
+      if (!id) dropUnused(asset);
+      if (id && asset.next) players_.setSuccessors(asset.id, asset.clips.successions());
       return id;
     });
   }
 
-  void removeInstance(InstanceId instance) override { players_.remove(instance); }
+  void removeInstance(InstanceId instance) override {
+    const InstanceView* view = players_.find(instance);
+    if (view == nullptr) return;
+    const AssetId asset = players_.track(view->clip).clip->asset;
+    players_.remove(instance);
+    dropUnused(assets_[asset.value]);
+  }
   void setPlayback(InstanceId instance, const Playback& playback) override { players_.setPlayback(instance, playback); }
   void setTransform(InstanceId instance, const std::array<double, 12>& objectToWorld) override {
     players_.setTransform(instance, objectToWorld);
@@ -178,6 +183,9 @@ class StreamerImpl final : public Streamer {
 
   Drawable drawable(InstanceId instance) const override { return players_.drawable(instance); }
   UploadWait wait() const override { return transport_ != nullptr ? transport_->wait() : UploadWait{}; }
+  void residency(InstanceId instance, std::span<std::uint8_t> frames) const override {
+    players_.residency(instance, frames);
+  }
   StreamStats stats() const override { return stats_; }
 
   std::optional<StreamError> takeError() override {
@@ -229,21 +237,12 @@ class StreamerImpl final : public Streamer {
     return {};
   }
 
-  std::vector<std::uint32_t> openClips(const Opened& opened) {
-    std::vector<std::uint32_t> clips;
-    for (const auto& clip : opened.clips) clips.push_back(clip != nullptr ? players_.openClip(clip) : format::kNone);
-    return clips;
-  }
-
-  void closeClips(std::vector<std::uint32_t>& clips) {
-    for (const std::uint32_t clip : clips) {
-      if (clip != format::kNone) players_.closeClip(clip);
-    }
-    clips.clear();
-  }
+  AssetClips::Home homeOf(AssetId asset) { return {asset, players_, transport_.get()}; }
+  static Opened* nextOf(Asset& asset) { return asset.next ? &*asset.next : nullptr; }
+  void dropUnused(Asset& asset) { asset.clips.dropUnused(asset.opened, nextOf(asset), homeOf(asset.id)); }
 
   void begin(Asset& asset, Opened opened) {
-    asset.clips = openClips(opened);
+    asset.clips.open(opened, homeOf(asset.id));
     asset.opened = std::move(opened);
     asset.state = AssetState::ready;
   }
@@ -275,30 +274,33 @@ class StreamerImpl final : public Streamer {
       return;
     }
     if (!done.reload) return begin(asset, std::move(*done.opened));
-    for (const InstanceView& view : players_.views()) {
-      const Clip& clip = *players_.track(view.clip).clip;
-      if (clip.asset != asset.id) continue;
-      if (clip.volume < done.opened->clips.size() && done.opened->clips[clip.volume] != nullptr) continue;
-      tell(
-          {.code = ErrorCode::pack,
-           .asset = asset.id,
-           .volume = clip.volume,
-           .message = "the new pack has no volume " + std::to_string(clip.volume) + " with frames; the old one stays"});
-      asset.reloading = false;
-      return letGo(std::move(*done.opened));
-    }
-    asset.nextClips = openClips(*done.opened);
     asset.next = std::move(*done.opened);
+    asset.clips.openNext(asset.opened, *asset.next, homeOf(asset.id));
     asset.waited = 0;
-    players_.setSuccessors(asset.id, asset.nextClips);
+    players_.setSuccessors(asset.id, asset.clips.successions());
+    const auto& views = players_.views();
+    const auto lacking = std::find_if(views.begin(), views.end(), [&](const InstanceView& view) {
+      return players_.track(view.clip).clip->asset == asset.id && view.successor == format::kNone;
+    });
+    if (lacking == views.end()) return;
+    const std::uint32_t volume = players_.track(lacking->clip).clip->volume;
+    tell({.code = ErrorCode::pack,
+          .asset = asset.id,
+          .volume = volume,
+          .message = "the new pack has no volume " + std::to_string(volume) + " with frames; the old one stays"});
+    leaveNext(asset);
   }
 
   void abandonReload(Asset& asset) {
     if (!asset.told) {
       tell({.code = ErrorCode::pack, .asset = asset.id, .message = "the new pack cannot be drawn; the old one stays"});
     }
+    leaveNext(asset);
+  }
+
+  void leaveNext(Asset& asset) {
     players_.setSuccessors(asset.id, {});
-    closeClips(asset.nextClips);
+    asset.clips.closeNext(homeOf(asset.id));
     letGo(std::move(*asset.next));
     asset.next.reset();
     asset.reloading = false;
@@ -311,10 +313,8 @@ class StreamerImpl final : public Streamer {
       if (players_.successorFailed(asset.id)) {
         abandonReload(asset);
       } else if (players_.succeed(asset.id)) {
-        closeClips(asset.clips);
+        asset.clips.succeed(homeOf(asset.id));
         letGo(std::exchange(asset.opened, std::move(*asset.next)));
-        asset.clips = std::move(asset.nextClips);
-        asset.nextClips.clear();
         asset.next.reset();
         asset.reloading = false;
         log(LogLevel::information, "a reloaded pack has taken its place");

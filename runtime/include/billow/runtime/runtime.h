@@ -95,6 +95,7 @@ struct GridChoice {
   std::uint32_t velocityX = format::kNone;  // of what the matter is carried along, in the volume's own world
   std::uint32_t velocityY = format::kNone;
   std::uint32_t velocityZ = format::kNone;
+  bool operator==(const GridChoice&) const = default;
 };
 
 // By role; where no grid has a role, the first grid is extinction. No velocity: it costs as much memory as the rest.

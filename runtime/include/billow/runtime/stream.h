@@ -135,8 +135,9 @@ struct Playback {
 
 struct InstanceInfo {
   AssetId asset = {};
-  std::uint32_t volume = 0;
-  double time = 0;  // seconds from the volume's first frame
+  std::uint32_t volume = 0;              // one that is a level of another is drawn as coarse as that, or coarser
+  std::optional<GridChoice> grids = {};  // of the volume; default: chooseGrids(). Its velocities come with advect alone
+  double time = 0;                       // seconds from the volume's first frame
   Playback playback = {};
   // As MetavoxelVolume has it; decides only how large the instance is in the picture.
   std::array<double, 12> objectToWorld{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
@@ -157,6 +158,9 @@ struct Drawable {
   bool held = false;    // nothing of the wanted moment was resident: the last one that was
   bool coarse = false;  // some of it coarser than the picture's size asks for
 };
+
+// In place of the width of a frame's voxels.
+inline constexpr std::uint8_t kNotResident = 0xff;
 
 // Why bricks of the wanted moments are not drawn in the detail that the picture asks for.
 enum class Missing { queued, reading, decoding, uploading, gpuBudget, cpuBudget, failed };
@@ -210,13 +214,15 @@ class Streamer {
   // Null unless ready. Valid until the next update() after close() or a reload that finished.
   virtual const format::Pack* pack(AssetId asset) const = 0;
   // Opens `source` beside the asset; once it is open and what is drawn now is resident of it, it takes the asset's
-  // place. Instances keep their time. A source that fails, or of which what is drawn has not come within 30 seconds,
-  // leaves all as it was, and an error. Instances without priority draw nothing of it until they have some again. An
-  // asset that failed to open is opened from `source` as by openLater().
+  // place. Instances keep their time, and draw the grids of the same names. A source that fails, or of which what is
+  // drawn has not come within 30 seconds, leaves all as it was, and an error. Instances without priority draw nothing
+  // of it until they have some again. An asset that failed to open is opened from `source` as by openLater().
   virtual Result<void> reload(AssetId asset, const PackSource& source) = 0;
   // Its instances go too.
   virtual void close(AssetId asset) = 0;
 
+  // Instances of one volume share what is resident of it, where they draw the same grids. The first that asks for
+  // others, or for a level, has its tables made here: some microseconds a frame, and bytes of the CPU budget.
   virtual Result<InstanceId> addInstance(const InstanceInfo& info) = 0;
   virtual void removeInstance(InstanceId instance) = 0;
   // These leave all as it is where there is no such instance, or a number is not finite.
@@ -233,6 +239,9 @@ class Streamer {
   virtual void update(const UpdateInfo& info) = 0;
   virtual Drawable drawable(InstanceId instance) const = 0;
   virtual UploadWait wait() const = 0;
+  // For each frame of the instance's volume, the finest that is resident of it: n where its voxels are 2^n of the
+  // volume's wide, kNotResident where nothing is; also past the last frame, and where there is no such instance.
+  virtual void residency(InstanceId instance, std::span<std::uint8_t> frames) const = 0;
 
   virtual StreamStats stats() const = 0;
   // Each error once, the oldest first. Until it is taken, a shortage of memory is told once for an asset.
