@@ -11,7 +11,8 @@
 
 namespace billow::tests {
 
-inline constexpr std::uint32_t kCloudDim = 48;  // voxels
+inline constexpr std::uint32_t kCloudDim = 32;               // voxels
+inline constexpr std::uint32_t kCloudCells = kCloudDim / 8;  // bricks
 inline constexpr std::uint32_t kFirstCell = 10;
 inline constexpr double kMiddle = (kFirstCell * 8 + (kCloudDim - 1) / 2.0) * 0.1;  // world, of GridFrameBuilder's grids
 
@@ -33,8 +34,9 @@ inline float densityOf(const MovingCloud& cloud, std::uint32_t x, std::uint32_t 
 template <class Value>
 format::GridFrame cloudGrid(format::PackWriter& writer, format::PackTables& tables, const Value& valueAt) {
   GridFrameBuilder grid(writer, 0);
-  for (std::uint32_t cell = 0; cell < 7 * 36; ++cell) {
-    const std::uint32_t at[3] = {cell / 36, cell / 6 % 6, cell % 6};
+  for (std::uint32_t cell = 0; cell < (kCloudCells + 1) * kCloudCells * kCloudCells; ++cell) {
+    const std::uint32_t at[3] = {cell / (kCloudCells * kCloudCells), cell / kCloudCells % kCloudCells,
+                                 cell % kCloudCells};
     std::vector<std::byte> texels(512);
     bool any = false;
     for (std::uint32_t i = 0; i < 512; ++i) {
@@ -53,8 +55,9 @@ inline format::GridFrame velocityGrid(format::PackWriter& writer, format::PackTa
                                       std::uint32_t axis) {
   if (cloud.tight) {
     GridFrameBuilder grid(writer, 0);
-    for (std::uint32_t cell = 0; cell < 7 * 36; ++cell) {
-      const std::uint32_t at[3] = {cell / 36, cell / 6 % 6, cell % 6};
+    for (std::uint32_t cell = 0; cell < (kCloudCells + 1) * kCloudCells * kCloudCells; ++cell) {
+      const std::uint32_t at[3] = {cell / (kCloudCells * kCloudCells), cell / kCloudCells % kCloudCells,
+                                   cell % kCloudCells};
       format::Mask3 mask{};
       for (std::uint32_t i = 0; i < 512; ++i) {
         const float value = densityOf(cloud, at[0] * 8 + (i >> 6), at[1] * 8 + (i >> 3 & 7), at[2] * 8 + (i & 7));
@@ -91,7 +94,7 @@ inline format::GridFrame velocityGrid(format::PackWriter& writer, format::PackTa
 
 }  // namespace layers
 
-// A noisy cloud of 48^3 voxels of 0.1 as grid "density", and its velocity.
+// A noisy cloud of kCloudDim^3 voxels of 0.1 as grid "density", and its velocity.
 inline std::vector<std::byte> movingCloudPack(const MovingCloud& cloud) {
   std::vector<std::string> names{"density"};
   if (cloud.burning) names.push_back("flames");
@@ -120,7 +123,7 @@ inline std::vector<std::byte> slabPack(float density, std::uint32_t coarse) {
   return writePack({}, [&](format::PackWriter& writer) {
     format::PackTables tables = sampleTables("v", {"density"}, 1);
     GridFrameBuilder grid(writer, 0);
-    const std::uint32_t along = 6 / coarse;
+    const std::uint32_t along = kCloudCells / coarse;
     for (std::uint32_t cell = 0; cell < along * along * along; ++cell) {
       grid.brick({kFirstCell / coarse + cell / (along * along), kFirstCell / coarse + cell / along % along,
                   kFirstCell / coarse + cell % along},

@@ -13,9 +13,9 @@ class MarchLayers : public MetavoxelTest {
  protected:
   static runtime::DrawInfo cloudDraw() {
     runtime::DrawInfo draw;
-    draw.view = runtime::lookAt({kMiddle + 3, kMiddle + 2, kMiddle + 16}, {kMiddle, kMiddle, kMiddle}, {0, 1, 0}, 30);
+    draw.view = runtime::lookAt({kMiddle + 3, kMiddle + 2, kMiddle + 16}, {kMiddle, kMiddle, kMiddle}, {0, 1, 0}, 20);
     draw.sun.direction = {0.3f, 1, 0.2f};
-    draw.look.extinctionScale = 5;
+    draw.look.extinctionScale = 7.5f;
     draw.look.emissionScale = 4;
     draw.look.temperatureScale = 1500;
     draw.quality = {.step = 0.5f, .shadowStep = 1};
@@ -65,8 +65,8 @@ TEST_F(MarchLayers, ExtinctionIsLinearInTheWeights) {
   const format::Pack thinPack = openPack(slabPack(0.25f, 1)), coarsePack = openPack(slabPack(0.75f, 2));
   const auto thin = upload(*renderer_, thinPack), coarse = upload(*renderer_, coarsePack);
   runtime::DrawInfo info = cloudDraw();
-  info.view = runtime::lookAt({kMiddle, kMiddle, kMiddle + 16}, {kMiddle, kMiddle, kMiddle}, {0, 1, 0}, 26);
-  info.look.extinctionScale = 1;
+  info.view = runtime::lookAt({kMiddle, kMiddle, kMiddle + 16}, {kMiddle, kMiddle, kMiddle}, {0, 1, 0}, 17);
+  info.look.extinctionScale = 1.5f;
   info.width = info.height = 48;  // steps are no shorter than a pixel is wide
   for (const float weight : {0.0f, 0.25f, 0.6f, 1.0f}) {
     const headless::Picture picture = draw(info, {{thin.get(), 1 - weight}, {coarse.get(), weight}});
