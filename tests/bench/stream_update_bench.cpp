@@ -44,6 +44,8 @@ class InstantTransport final : public runtime::Transport {
   }
   std::uint64_t wantedGpuBytes() const override { return 0; }
   bool mustLeave(const runtime::ResidentFrame&) const override { return false; }
+  bool admit(const runtime::ResidentFrame&) override { return true; }
+  void stop() override {}
   void update() override {
     ++updates_;
     while (!retired_.empty() && retired_.front().first + config_.framesInFlight <= updates_) retired_.pop_front();
