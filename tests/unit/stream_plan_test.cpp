@@ -89,18 +89,65 @@ TEST_F(StreamPlan, PlaysWithoutAHoldWhereAllFits) {
   EXPECT_FALSE(stream->takeError());
 }
 
-// Planning may be just swapping when a snapshot is there: it is filled anew then, and nothing that it told is lost.
-TEST_F(StreamPlan, NoticesOfASnapshotThatWasNotTakenGoFirst) {
+// Planning may be just swapping when a report is there: it is filled anew then, and nothing that it told is lost.
+TEST_F(StreamPlan, NoticesOfAReportThatWasNotTakenGoFirst) {
   auto clip = std::make_shared<runtime::Clip>();
   clip->same = {0};
   clip->levels.resize(2);
   runtime::Players players;
-  runtime::Snapshot snapshot;
+  runtime::Report report;
   for (std::uint32_t number = 0; number < 4; ++number) {
     EXPECT_EQ(players.openClip(clip), number);
-    players.fill(snapshot);
-    ASSERT_EQ(snapshot.notices.size(), number + 1);
-    for (std::uint32_t i = 0; i <= number; ++i) EXPECT_EQ(snapshot.notices[i].clip, i);
+    players.fill(report);
+    ASSERT_EQ(report.notices.size(), number + 1);
+    for (std::uint32_t i = 0; i <= number; ++i) EXPECT_EQ(report.notices[i].clip, i);
+  }
+}
+
+// Whatever comes, goes and changes, and however many reports are not taken.
+TEST_F(StreamPlan, ReportsTellPlanningWhatThereIs) {
+  const auto clip = std::make_shared<runtime::Clip>();
+  clip->same = {0};
+  clip->levels.resize(2);
+  runtime::Players players;
+  const std::uint32_t number = players.openClip(clip);
+  runtime::Report report;
+  runtime::Snapshot snapshot;
+  std::mt19937 random(8);
+  std::vector<InstanceId> ids;
+  for (int i = 0; i < 3000; ++i) {
+    const InstanceId any = ids.empty() ? InstanceId{} : ids[random() % ids.size()];
+    switch (random() % 6) {
+      case 0:
+        ids.push_back(*players.add({.time = i * 0.01, .priority = static_cast<float>(i)}, number));
+        break;
+      case 1:
+        players.remove(any);
+        std::erase(ids, any);
+        break;
+      case 2:
+        players.setPriority(any, static_cast<float>(random() % 100));
+        break;
+      case 3:
+        players.setTransform(any, {1, 0, 0, i * 1.0, 0, 1, 0, 0, 0, 0, 1, 0});
+        break;
+      case 4:
+        players.setPlayback(any, {.speed = i * 0.1, .loop = Loop::once});
+        break;
+      default:
+        players.fill(report);
+        if (random() % 2 == 0) break;
+        snapshot.take(report);
+        ASSERT_EQ(snapshot.instances.size(), players.views().size());
+        for (std::size_t at = 0; at < snapshot.instances.size(); ++at) {
+          const runtime::InstanceView &told = snapshot.instances[at], &is = players.views()[at];
+          ASSERT_EQ(told.id.value, is.id.value) << i;
+          ASSERT_EQ(told.priority, is.priority) << i;
+          ASSERT_EQ(told.centre, is.centre) << i;
+          ASSERT_EQ(told.playback.speed, is.playback.speed) << i;
+          ASSERT_EQ(told.phase, is.phase) << i;
+        }
+    }
   }
 }
 
@@ -111,24 +158,26 @@ TEST_F(StreamPlan, OnlyAShrunkBudgetTakesTheLastFrameOfAnInstance) {
   runtime::Players players;
   FakeTransport transport({}, {});
   ASSERT_TRUE(players.add({}, players.openClip(clip)));
+  std::uint32_t drawn = 0;
   const auto change = [&](runtime::Change::Kind kind, std::unique_ptr<runtime::ResidentFrame> frame) {
     runtime::Change made{.kind = kind, .clip = 0, .item = 0, .instance = {}, .frame = std::move(frame)};
     players.take({&made, 1}, transport);
     players.advance(0, 1);
-    runtime::Snapshot snapshot;
-    players.fill(snapshot);
-    return std::move(snapshot.notices);
+    runtime::Report report;
+    players.fill(report);
+    drawn = report.moments[0].drawnCount;
+    return std::move(report.notices);
   };
   change(runtime::Change::Kind::arrive, std::make_unique<runtime::ResidentFrame>());
-  EXPECT_EQ(players.views()[0].drawnCount, 1u);
+  EXPECT_EQ(drawn, 1u);
   auto notices = change(runtime::Change::Kind::force, nullptr);
   ASSERT_EQ(notices.size(), 1u);
   EXPECT_EQ(notices[0].kind, runtime::Notice::Kind::refused);
-  EXPECT_EQ(players.views()[0].drawnCount, 1u);
+  EXPECT_EQ(drawn, 1u);
   notices = change(runtime::Change::Kind::seize, nullptr);
   ASSERT_EQ(notices.size(), 1u);
   EXPECT_EQ(notices[0].kind, runtime::Notice::Kind::retired);
-  EXPECT_EQ(players.views()[0].drawnCount, 0u);
+  EXPECT_EQ(drawn, 0u);
   for (int i = 0; i < 5; ++i) transport.update();
 }
 

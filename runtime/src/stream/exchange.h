@@ -23,20 +23,24 @@ struct Shown {
   bool coarse = false;
 };
 
+// What of an instance is another in each update().
+struct InstanceMoment {
+  double phase = 0;
+  std::array<std::uint32_t, kMostLayers> drawn{};  // items
+  std::uint32_t drawnCount = 0;
+  bool held = false;
+};
+
 // One instance, as planning needs it.
-struct InstanceView {
+struct InstanceView : InstanceMoment {
   InstanceId id = {};
   std::uint32_t clip = 0;
   std::uint32_t successor = format::kNone;  // the clip that is to take its place
-  double phase = 0;
   Playback playback = {};
   float priority = 1;
   std::array<double, 3> centre{};  // in the world
   double radius = 0;
-  double scale = 1;                                // of the volume's own world
-  std::array<std::uint32_t, kMostLayers> drawn{};  // items
-  std::uint32_t drawnCount = 0;
-  bool held = false;
+  double scale = 1;  // of the volume's own world
 };
 
 // Where the instance is in the clip that is to take the place of its own.
@@ -55,14 +59,32 @@ struct Notice {
   std::shared_ptr<const Clip> opened = {};
 };
 
-struct Snapshot {
+// What an update() leaves behind, but for the instances.
+struct Situation {
   double now = 0;  // real seconds, the sum of what update() was told
   std::uint64_t update = 0;
   std::optional<View> view = {};
   std::uint32_t pixelsHigh = 1080;
   std::uint64_t gpuBudget = 0;
-  std::vector<InstanceView> instances;
+};
+
+// From the frame thread: all that planning does not know yet.
+struct Report : Situation {
+  struct Placed {
+    std::uint32_t index = 0;
+    InstanceView view;  // but for its moment
+  };
+  std::vector<InstanceMoment> moments;  // of all instances
+  std::vector<Placed> changed;          // in the order in which they did
   std::vector<Notice> notices;
+};
+
+// What planning knows.
+struct Snapshot : Situation {
+  std::vector<InstanceView> instances;
+  std::vector<Notice> notices;  // not dealt with yet
+  // Empties the report. Throws std::bad_alloc, and may be called again then.
+  void take(Report& report);
 };
 
 // From planning: what the frame thread takes in at its next update.

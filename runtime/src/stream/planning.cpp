@@ -5,6 +5,22 @@
 #include <utility>
 
 namespace billow::runtime {
+
+void Snapshot::take(Report& report) {
+  static_cast<Situation&>(*this) = report;
+  instances.resize(report.moments.size());
+  notices.reserve(notices.size() + report.notices.size());
+  for (const Report::Placed& placed : report.changed) {
+    // Others may have gone since.
+    if (placed.index < instances.size()) instances[placed.index] = placed.view;
+  }
+  for (std::size_t i = 0; i < instances.size(); ++i) static_cast<InstanceMoment&>(instances[i]) = report.moments[i];
+  notices.insert(notices.end(), std::make_move_iterator(report.notices.begin()),
+                 std::make_move_iterator(report.notices.end()));
+  report.changed.clear();
+  report.notices.clear();
+}
+
 namespace {
 
 template <class T>
@@ -36,8 +52,9 @@ void Planning::stop() {
 void Planning::clear() {
   const std::lock_guard lock(mutex_);
   planner_.reset();
-  snapshot_ = pending_ = {};
-  began_ = false;
+  report_ = pending_ = {};
+  snapshot_ = {};
+  came_ = began_ = false;
   fresh_ = false;
   changes_.clear();
   errors_.clear();
@@ -73,12 +90,14 @@ void Planning::work() {
 void Planning::pass() {
   {
     const std::lock_guard lock(mutex_);
-    if (fresh_.load(std::memory_order_relaxed)) {
-      std::swap(snapshot_, pending_);
+    if (!came_ && fresh_.load(std::memory_order_relaxed)) {
+      std::swap(report_, pending_);
       fresh_.store(false, std::memory_order_release);
-      began_ = true;
+      came_ = began_ = true;
     }
   }
+  if (came_) snapshot_.take(report_);
+  came_ = false;
   if (!began_) return;
   planner_->pass(snapshot_, made_, met_);
   const std::lock_guard lock(mutex_);
@@ -96,10 +115,10 @@ void Planning::take(std::vector<Change>& changes, std::vector<StreamError>& erro
   stats = stats_;
 }
 
-void Planning::publish(Snapshot& snapshot) {
+void Planning::publish(Report& report) {
   const std::unique_lock lock(mutex_, std::try_to_lock);
   if (!lock) return;
-  std::swap(snapshot, pending_);
+  std::swap(report, pending_);
   fresh_.store(true, std::memory_order_release);
 }
 

@@ -37,9 +37,9 @@ class Planning {
 
   // On the frame thread. What planning made since the last time; nothing where it is just handing something over.
   void take(std::vector<Change>& changes, std::vector<StreamError>& errors, PlanStats& stats);
-  // Whether a new snapshot is welcome; publish() may then swap it in.
-  bool wantsSnapshot() const { return !fresh_.load(std::memory_order_acquire); }
-  void publish(Snapshot& snapshot);
+  // Whether a new report is welcome; publish() may then swap it in, and leave an empty one.
+  bool wantsReport() const { return !fresh_.load(std::memory_order_acquire); }
+  void publish(Report& report);
 
  private:
   void work();
@@ -49,8 +49,10 @@ class Planning {
   // Of the thread that makes passes.
   std::unique_ptr<Planner> planner_;
   ToldPages told_;
+  Report report_;
   Snapshot snapshot_;
-  bool began_ = false;  // a snapshot has come
+  bool came_ = false;   // the report is not in the snapshot yet
+  bool began_ = false;  // a report has come
   std::vector<Change> made_;
   std::vector<StreamError> met_;
 
@@ -60,7 +62,7 @@ class Planning {
   bool wanted_ = false, stopped_ = true;  // by turn_
 
   std::mutex mutex_;  // of all below; held for swaps alone
-  Snapshot pending_;
+  Report pending_;
   std::atomic<bool> fresh_ = false;
   std::vector<Change> changes_;
   std::vector<StreamError> errors_;

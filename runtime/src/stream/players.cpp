@@ -60,9 +60,24 @@ std::uint32_t Players::indexOf(InstanceId id) const {
   return handles_[slot].index;
 }
 
-InstanceView* Players::find(InstanceId id) {
+const InstanceView* Players::find(InstanceId id) const {
   const std::uint32_t index = indexOf(id);
   return index == format::kNone ? nullptr : &views_[index];
+}
+
+void Players::touch(std::uint32_t index) {
+  if (std::exchange(touched_[index], std::uint8_t{1}) == 0) touches_.push_back(index);
+}
+
+void Players::touchAll() {
+  for (std::uint32_t i = 0; i < views_.size(); ++i) touch(i);
+}
+
+void Players::setPriority(InstanceId id, float priority) {
+  const std::uint32_t index = indexOf(id);
+  if (index == format::kNone || !std::isfinite(priority)) return;
+  views_[index].priority = std::max(priority, 0.0f);
+  touch(index);
 }
 
 Result<InstanceId> Players::add(const InstanceInfo& info, std::uint32_t clip) {
@@ -85,6 +100,7 @@ Result<InstanceId> Players::add(const InstanceInfo& info, std::uint32_t clip) {
   players_.emplace_back();
   shown_.emplace_back();
   transforms_.push_back(info.objectToWorld);
+  touched_.push_back(0);
   place(static_cast<std::uint32_t>(views_.size()) - 1);
   return view.id;
 }
@@ -101,12 +117,14 @@ void Players::removeAt(std::uint32_t index) {
     players_[index] = players_[last];
     shown_[index] = shown_[last];
     transforms_[index] = transforms_[last];
+    touch(index);
     handles_[views_[index].id.value & kHandleSlotMask].index = index;
   }
   views_.pop_back();
   players_.pop_back();
   shown_.pop_back();
   transforms_.pop_back();
+  touched_.pop_back();
 }
 
 void Players::remove(InstanceId id) {
@@ -131,6 +149,7 @@ void Players::place(std::uint32_t index) {
   for (double& x : view.centre) x = bounded(x);
   view.scale = bounded(std::max({lengthOfColumn(m, 0), lengthOfColumn(m, 1), lengthOfColumn(m, 2)}));
   view.radius = bounded(clip.radius * view.scale);
+  touch(index);
 }
 
 void Players::setTransform(InstanceId id, const std::array<double, 12>& objectToWorld) {
@@ -152,6 +171,7 @@ void Players::setPlayback(InstanceId id, const Playback& playback) {
     players_[index].passed = 0;
   }
   view.playback = playback;
+  touch(index);
 }
 
 void Players::seek(InstanceId id, double time) {
@@ -199,11 +219,13 @@ bool Players::plays(std::uint32_t clip) const {
 }
 
 void Players::setSuccessors(AssetId asset, std::span<const Succession> successions) {
-  for (InstanceView& view : views_) {
+  for (std::uint32_t i = 0; i < views_.size(); ++i) {
+    InstanceView& view = views_[i];
     if (tracks_[view.clip].clip->asset != asset) continue;
     const auto found = std::find_if(successions.begin(), successions.end(),
                                     [&](const Succession& succession) { return succession.clip == view.clip; });
     view.successor = found == successions.end() ? format::kNone : found->successor;
+    touch(i);
   }
 }
 
@@ -252,8 +274,7 @@ bool Players::succeed(AssetId asset) {
     if (tracks_[view.clip].clip->asset != asset || view.successor == format::kNone) continue;
     view.phase = successorPhase(*tracks_[view.clip].clip, *tracks_[view.successor].clip, view);
     view.clip = std::exchange(view.successor, format::kNone);
-    view.drawnCount = 0;
-    players_[i] = {.fades = {}, .passed = 0, .near = 0, .level = players_[i].level};
+    players_[i] = {.fades = {}, .passed = 0, .near = 0, .level = players_[i].level, .ideal = players_[i].ideal};
     shown_[i] = {};
     place(i);
   }
@@ -359,9 +380,6 @@ void Players::advance(double seconds, std::uint64_t update) {
     view.phase = wrapPhase(track.clip->timeline, view.playback.loop, view.phase + moved);
     Shown& shown = shown_[i];
     chooseLayers(track, view, players_[i], shown, moved, passing, update);
-    view.drawn = shown.items;
-    view.drawnCount = shown.count;
-    view.held = shown.held;
     if (!(view.priority > 0)) continue;
     ++count_.all;
     if (shown.count == 0) ++count_.empty;
@@ -382,11 +400,20 @@ void Players::giveBack(Transport& transport, std::uint64_t update) {
   asked_.clear();
 }
 
-void Players::fill(Snapshot& snapshot) {
-  snapshot.instances = views_;
-  // Those of a snapshot that could not be handed over go first.
-  snapshot.notices.insert(snapshot.notices.end(), std::make_move_iterator(notices_.begin()),
-                          std::make_move_iterator(notices_.end()));
+void Players::fill(Report& report) {
+  report.moments.resize(views_.size());
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    const Shown& shown = shown_[i];
+    report.moments[i] = {.phase = views_[i].phase, .drawn = shown.items, .drawnCount = shown.count, .held = shown.held};
+  }
+  report.changed.reserve(report.changed.size() + touches_.size());
+  for (const std::uint32_t index : touches_) {
+    if (index >= views_.size() || std::exchange(touched_[index], std::uint8_t{0}) == 0) continue;
+    report.changed.push_back({.index = index, .view = views_[index]});
+  }
+  touches_.clear();
+  report.notices.insert(report.notices.end(), std::make_move_iterator(notices_.begin()),
+                        std::make_move_iterator(notices_.end()));
   notices_.clear();
 }
 
@@ -406,9 +433,9 @@ void Players::dropFrames() {
   }
   for (std::size_t i = 0; i < views_.size(); ++i) {
     shown_[i] = {};
-    players_[i] = {.fades = {}, .passed = 0, .near = 0, .level = players_[i].level};
-    views_[i].drawnCount = 0;
+    players_[i] = {.fades = {}, .passed = 0, .near = 0, .level = players_[i].level, .ideal = players_[i].ideal};
   }
+  touchAll();
 }
 
 }  // namespace billow::runtime

@@ -76,8 +76,9 @@ class Players {
   Result<InstanceId> add(const InstanceInfo& info, std::uint32_t clip);
   void remove(InstanceId id);
   void removeOf(AssetId asset);
-  // Null where there is no such instance. What place() gives depends on transform and clip.
-  InstanceView* find(InstanceId id);
+  // Null where there is no such instance.
+  const InstanceView* find(InstanceId id) const;
+  void setPriority(InstanceId id, float priority);
   void setTransform(InstanceId id, const std::array<double, 12>& objectToWorld);
   void setPlayback(InstanceId id, const Playback& playback);
   void seek(InstanceId id, double time);
@@ -101,7 +102,8 @@ class Players {
   std::size_t take(std::span<Change> changes, Transport& transport);
   void advance(double seconds, std::uint64_t update);
   void giveBack(Transport& transport, std::uint64_t update);
-  void fill(Snapshot& snapshot);
+  // Adds what planning does not know to what of a report it has not taken.
+  void fill(Report& report);
 
   RetiredCount retired() const { return retired_; }  // since it was made
   InstanceCount count() const { return count_; }     // at the last advance()
@@ -114,6 +116,9 @@ class Players {
     std::uint32_t index = format::kNone;
   };
   std::uint32_t indexOf(InstanceId id) const;
+  void touch(std::uint32_t index);
+  void touchAll();
+  // What depends on transform and clip.
   void place(std::uint32_t index);
   void removeAt(std::uint32_t index);
   bool isLast(std::uint32_t clip, std::uint32_t item) const;
@@ -126,6 +131,8 @@ class Players {
   std::vector<Player> players_;
   std::vector<Shown> shown_;
   std::vector<std::array<double, 12>> transforms_;
+  std::vector<std::uint8_t> touched_;   // views that planning does not know: but for their moments, which it is told
+  std::vector<std::uint32_t> touches_;  // of these, some of which may be gone
   std::vector<Handle> handles_;
   std::vector<std::uint32_t> freeHandles_;
   std::vector<Notice> notices_;

@@ -161,10 +161,7 @@ class StreamerImpl final : public Streamer {
   void setTransform(InstanceId instance, const std::array<double, 12>& objectToWorld) override {
     players_.setTransform(instance, objectToWorld);
   }
-  void setPriority(InstanceId instance, float priority) override {
-    InstanceView* view = players_.find(instance);
-    if (view != nullptr && std::isfinite(priority)) view->priority = std::max(priority, 0.0f);
-  }
+  void setPriority(InstanceId instance, float priority) override { players_.setPriority(instance, priority); }
   void seek(InstanceId instance, double time) override { players_.seek(instance, time); }
 
   void setBudget(std::uint64_t gpuBytes, std::uint64_t cpuBytes) override {
@@ -339,9 +336,9 @@ class StreamerImpl final : public Streamer {
     finishReloads(seconds);
     players_.advance(seconds, stats_.updates);
     players_.giveBack(*transport_, stats_.updates);
-    if (planning_.wantsSnapshot()) {
-      fillSnapshot(info);
-      planning_.publish(snapshot_);
+    if (planning_.wantsReport()) {
+      fillReport(info);
+      planning_.publish(report_);
     }
     planning_.request();
     count();
@@ -375,14 +372,14 @@ class StreamerImpl final : public Streamer {
     met_.clear();
   }
 
-  void fillSnapshot(const UpdateInfo& info) {
-    snapshot_.now = now_;
-    snapshot_.update = stats_.updates;
-    snapshot_.view = info.view;
-    if (info.view && badView(*info.view) != nullptr) snapshot_.view.reset();
-    snapshot_.pixelsHigh = info.pixelsHigh;
-    snapshot_.gpuBudget = config_.gpuBudget;
-    players_.fill(snapshot_);
+  void fillReport(const UpdateInfo& info) {
+    report_.now = now_;
+    report_.update = stats_.updates;
+    report_.view = info.view;
+    if (info.view && badView(*info.view) != nullptr) report_.view.reset();
+    report_.pixelsHigh = info.pixelsHigh;
+    report_.gpuBudget = config_.gpuBudget;
+    players_.fill(report_);
   }
 
   void count() {
@@ -425,7 +422,7 @@ class StreamerImpl final : public Streamer {
     planning_.clear();
     changes_.clear();
     met_.clear();
-    snapshot_ = {};
+    report_ = {};
     players_.dropFrames();
     plan_ = {};
     loadedBefore_ = 0;
@@ -449,7 +446,7 @@ class StreamerImpl final : public Streamer {
   std::vector<Change> changes_;
   std::vector<StreamError> met_;
   std::vector<OpenDone> opened_;
-  Snapshot snapshot_;
+  Report report_;
   PlanStats plan_;
   TransportStats before_;
   RetiredCount retiredBefore_;
