@@ -2,6 +2,7 @@
 // take() cost on the frame thread.
 //   billow_transport_bench PACK.blw [threads] [seconds]
 #include <fmt/format.h>
+#include <time.h>
 
 #include <algorithm>
 #include <chrono>
@@ -26,6 +27,13 @@ double microseconds(Clock::time_point from) {
 double quantile(std::vector<double>& values, double share) {
   std::sort(values.begin(), values.end());
   return values.empty() ? 0 : values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+// Of all threads, the driver's too.
+double processSeconds() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec) * 1e-9;
 }
 
 struct Run {
@@ -96,14 +104,18 @@ int main(int count, char** arguments) {
   config.threads = count > 2 ? static_cast<std::uint32_t>(std::atoi(arguments[2])) : 1;
   const auto transport = bench::valueOf(runtime::Transport::create(runtime::deviceOf(*renderer), config, {}));
   Run run{.transport = *transport, .pack = pack, .updates = {}, .busyUpdates = {}, .takes = {}, .submits = {}};
+  const double before = processSeconds();
   const auto begin = Clock::now();
   run.loadFor(count > 3 ? std::atof(arguments[3]) : 5);
   const double seconds = microseconds(begin) / 1e6;
+  const double cpu = processSeconds() - before;
   const auto stats = transport->stats();
-  fmt::print("{}: {} threads, {} frames in {:.2f} s: {:.1f} MB/s of GPU bytes, {:.1f} read, {:.1f} decompressed\n",
-             gpu->deviceName(), config.threads, run.frames, seconds, static_cast<double>(run.gpuBytes) / seconds / 1e6,
-             static_cast<double>(stats.bytesRead) / seconds / 1e6,
-             static_cast<double>(stats.bytesDecompressed) / seconds / 1e6);
+  fmt::print(
+      "{}: {} threads, {} frames in {:.2f} s: {:.1f} MB/s of GPU bytes, {:.1f} read, {:.1f} decompressed; "
+      "{:.1f} MB of GPU bytes a second of a core\n",
+      gpu->deviceName(), config.threads, run.frames, seconds, static_cast<double>(run.gpuBytes) / seconds / 1e6,
+      static_cast<double>(stats.bytesRead) / seconds / 1e6,
+      static_cast<double>(stats.bytesDecompressed) / seconds / 1e6, static_cast<double>(run.gpuBytes) / cpu / 1e6);
   fmt::print(
       "update(): median {:.1f} us, p99 {:.1f} us, with an arrival {:.1f} us; take(): {:.1f}, {:.1f}; submit(): "
       "{:.1f}, {:.1f}\n",

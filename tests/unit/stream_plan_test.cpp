@@ -403,9 +403,9 @@ TEST_F(StreamPlan, AQuarterOfTheBudgetPlays) {
 // What is given back takes its memory for some updates yet, and what comes for some before it is drawn: where both do
 // not fit at a speed, all is drawn coarser instead of half of it late.
 TEST_F(StreamPlan, AFastLoopThatDoesNotFitIsCoarserButNeverLate) {
-  const PackFile file(sequencePack(12, evenBricks));
+  const PackFile file(sequencePack(12, [](std::uint32_t frame) { return 60 + 8 * (frame % 7); }));
   for (const double share : {0.35, 0.5, 0.6}) {
-    for (const double speed : {4.0, -4.0, 7.3}) {
+    for (const double speed : {1.0, -1.0, 4.0, -4.0, 7.3}) {
       for (const Loop loop : {Loop::loop, Loop::pingPong}) {
         FakeStream stream({.gpuBudget = static_cast<std::uint64_t>(share * static_cast<double>(bytesOfAll(file)))});
         stream.transport().parallel = 16;

@@ -150,7 +150,7 @@ void Detail::choose(const Snapshot& snapshot, std::vector<PlannedClip>& clips, c
     for (State& state : states_) state.pause = kLevelPause;
   }
   budget_ = snapshot.gpuBudget;
-  const auto budget = static_cast<double>(snapshot.gpuBudget);
+  const auto budget = static_cast<double>(pace.room);
   double taken = 0;
   // What is counted once is marked: with an even number at its coarsest, with an odd one at the level that is chosen.
   const auto add = [&](PlannedClip& clip, const Ranked& ranked, std::uint32_t level, std::uint64_t mark, bool keep) {

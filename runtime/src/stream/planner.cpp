@@ -38,7 +38,8 @@ Pace Planner::pace(const Snapshot& snapshot) {
     paceUpdate_ = snapshot.update;
   }
   // What has arrived waits for an update().
-  return {.ahead = std::min(quickest_.value_or(0), kLongestLatency) + updateSeconds_,
+  return {.room = budget_ - std::min(slack_, budget_),
+          .ahead = std::min(quickest_.value_or(0), kLongestLatency) + updateSeconds_,
           .behind = config_.framesInFlight * updateSeconds_};
 }
 
