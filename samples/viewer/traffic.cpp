@@ -15,7 +15,7 @@ constexpr std::array<const char*, runtime::kMissingCount> kWaits = {"queued",   
 
 void Traffic::add(const runtime::StreamStats& stats, double seconds) {
   now_ = stats;
-  if (stats.instancesHeld > 0) ++late_;
+  late_ += stats.framesLate;
   loaded_ += stats.framesLoaded;
   evicted_ += stats.framesEvicted;
   sums_.read += static_cast<double>(stats.bytesRead);

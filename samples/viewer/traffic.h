@@ -16,7 +16,7 @@ class Traffic {
   void add(const runtime::StreamStats& stats, double seconds);
 
   const runtime::StreamStats& now() const { return now_; }
-  // Updates in which an instance showed another moment than its own.
+  // Frames that began when nothing of their moment could be drawn.
   std::uint64_t late() const { return late_; }
   std::uint64_t loaded() const { return loaded_; }
   std::uint64_t evicted() const { return evicted_; }

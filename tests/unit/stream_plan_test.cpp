@@ -428,6 +428,21 @@ TEST_F(StreamPlan, AFastLoopThatDoesNotFitIsCoarserButNeverLate) {
   }
 }
 
+TEST_F(StreamPlan, FramesThatNeverComeAreLateOnceEach) {
+  const PackFile file(sequencePack(12, evenBricks));
+  FakeStream stream;
+  stream.transport().fault = [](const runtime::LoadOrder&) -> std::optional<runtime::Error> {
+    return runtime::Error{.code = runtime::ErrorCode::memory, .message = "none"};
+  };
+  add(stream, open(stream, file), {}, 0.003);
+  std::uint32_t late = 0;
+  for (int i = 0; i < 600; ++i) {
+    stream.update(kTick);
+    late += stream->stats().framesLate;
+  }
+  EXPECT_EQ(late, 241u) << "24 a second, and the first";
+}
+
 // A disk that cannot bring the full detail in time is no reason to hold.
 TEST_F(StreamPlan, WhatComesTooLateIsDrawnCoarserAfterAWhile) {
   const PackFile file(sequencePack(120, evenBricks));
@@ -435,14 +450,21 @@ TEST_F(StreamPlan, WhatComesTooLateIsDrawnCoarserAfterAWhile) {
   stream.transport().parallel = 1;
   stream.transport().latency = 4;
   stream.transport().meansAreQuick = true;
-  const InstanceId id = add(stream, open(stream, file), {});
+  const InstanceId id = add(stream, open(stream, file), {}, 0.003);
   stream.update(240, kTick);
   int held = 0;
+  std::uint32_t late = 0, told = 0;
+  double wanted = 0.003 + 240 * kTick;
   for (int i = 0; i < 600; ++i) {
+    const double before = wanted;
+    wanted += kTick;
     stream.update(kTick);
     held += stream->drawable(id).held;
+    late += stream->drawable(id).held && std::floor(wanted * 24) > std::floor(before * 24);
+    told += stream->stats().framesLate;
   }
   EXPECT_LT(held, 30);
+  EXPECT_EQ(told, late);
 }
 
 TEST_F(StreamPlan, ASeekShowsTheNewMomentSoonAndHoldsTheOldUntilThen) {

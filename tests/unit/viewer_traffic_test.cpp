@@ -27,6 +27,7 @@ TEST(Traffic, TellsWhatStreamStatsSays) {
   stats.bytesUploaded = 3 << 20;
   stats.framesLoaded = 5;
   stats.framesEvicted = 2;
+  stats.framesLate = 1;
   stats.instances = 4;
   stats.instancesHeld = 3;
   stats.instancesCoarse = 2;

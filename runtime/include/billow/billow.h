@@ -600,6 +600,8 @@ typedef struct BillowStats {
   /* Since the update before. */
   uint64_t bytesRead, bytesDecompressed, bytesUploaded, bytesEvicted;
   uint32_t framesLoaded, framesEvicted;
+  uint32_t framesLate; /* began, for an instance with a priority above 0, when nothing of their moment could be drawn */
+  uint32_t reserved;
   /* Now. */
   uint64_t gpuBytes;      /* of resident and arriving frames */
   uint64_t gpuAllocated;  /* device memory held for frames, never above gpuBudget */
@@ -612,11 +614,11 @@ typedef struct BillowStats {
   uint32_t instancesHeld, instancesCoarse, instancesEmpty; /* as BillowInstanceState; empty: not drawable */
   uint64_t missingBricks[7];                               /* by BillowMissing */
 } BillowStats;
-#define BILLOW_STATS_DEFAULT                                                                 \
-  {                                                                                          \
-    sizeof(BillowStats), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, { \
-      0, 0, 0, 0, 0, 0, 0                                                                    \
-    }                                                                                        \
+#define BILLOW_STATS_DEFAULT                                                                       \
+  {                                                                                                \
+    sizeof(BillowStats), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, { \
+      0, 0, 0, 0, 0, 0, 0                                                                          \
+    }                                                                                              \
   }
 
 /* As of the last update. */

@@ -36,6 +36,7 @@ BillowStats statsOf(const BillowContext& context) {
   stats.bytesEvicted = from.bytesEvicted;
   stats.framesLoaded = from.framesLoaded;
   stats.framesEvicted = from.framesEvicted;
+  stats.framesLate = from.framesLate;
   stats.gpuBytes = from.gpuBytes;
   stats.gpuAllocated = from.gpuAllocated;
   stats.gpuPeak = from.gpuPeak;

@@ -274,7 +274,7 @@ bool Players::succeed(AssetId asset) {
     if (tracks_[view.clip].clip->asset != asset || view.successor == format::kNone) continue;
     view.phase = successorPhase(*tracks_[view.clip].clip, *tracks_[view.successor].clip, view);
     view.clip = std::exchange(view.successor, format::kNone);
-    players_[i] = {.fades = {}, .passed = 0, .near = 0, .level = players_[i].level, .ideal = players_[i].ideal};
+    players_[i] = {.fades = {}, .passed = 0, .near = format::kNone, .level = players_[i].level, .ideal = players_[i].ideal};
     shown_[i] = {};
     place(i);
   }
@@ -379,12 +379,14 @@ void Players::advance(double seconds, std::uint64_t update) {
     const double moved = view.playback.speed * seconds;
     view.phase = wrapPhase(track.clip->timeline, view.playback.loop, view.phase + moved);
     Shown& shown = shown_[i];
+    const std::uint32_t before = players_[i].near;
     chooseLayers(track, view, players_[i], shown, moved, passing, update);
     if (!(view.priority > 0)) continue;
     ++count_.all;
     if (shown.count == 0) ++count_.empty;
     if (shown.count > 0 && shown.held) ++count_.held;
     if (shown.coarse) ++count_.coarse;
+    if ((shown.held || shown.count == 0) && players_[i].near != before) ++count_.late;
   }
 }
 
@@ -433,7 +435,7 @@ void Players::dropFrames() {
   }
   for (std::size_t i = 0; i < views_.size(); ++i) {
     shown_[i] = {};
-    players_[i] = {.fades = {}, .passed = 0, .near = 0, .level = players_[i].level, .ideal = players_[i].ideal};
+    players_[i] = {.fades = {}, .passed = 0, .near = format::kNone, .level = players_[i].level, .ideal = players_[i].ideal};
   }
   touchAll();
 }

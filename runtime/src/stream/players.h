@@ -40,7 +40,7 @@ struct Fade {
 struct Player {
   Fade fades[2];
   double passed = 0;  // volume seconds since something of the moment was drawn, or since a seek
-  std::uint32_t near = 0;
+  std::uint32_t near = format::kNone;  // the frame that began last
   std::uint8_t level = 0;  // that planning chose
   std::uint8_t ideal = 0;  // that the picture's size asks for
 };
@@ -62,6 +62,7 @@ struct RetiredCount {
 // Of instances with priority.
 struct InstanceCount {
   std::uint32_t all = 0, held = 0, coarse = 0, empty = 0;
+  std::uint32_t late = 0;  // a frame of the volume has begun, and nothing of the moment is drawn
 };
 
 // Seconds that an update() counts for at least, in what is not play: a game that stands still gets its detail too.

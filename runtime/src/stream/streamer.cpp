@@ -410,6 +410,7 @@ class StreamerImpl final : public Streamer {
     stats_.instancesHeld = instances.held;
     stats_.instancesCoarse = instances.coarse;
     stats_.instancesEmpty = instances.empty;
+    stats_.framesLate = instances.late;
   }
 
   // Everything on the device is given back, or is about to be with the transport.

@@ -171,6 +171,7 @@ struct StreamStats {
   // Since the update() before.
   std::uint64_t bytesRead = 0, bytesDecompressed = 0, bytesUploaded = 0, bytesEvicted = 0;
   std::uint32_t framesLoaded = 0, framesEvicted = 0;
+  std::uint32_t framesLate = 0;  // began, for an instance with priority, when nothing of their moment could be drawn
   // Now.
   std::uint64_t gpuBytes = 0;      // of resident and arriving frames
   std::uint64_t gpuAllocated = 0;  // device memory held, never above gpuBudget
