@@ -82,6 +82,7 @@ class Soak {
   void repair();
   void clearFaults();
   void takeErrors();
+  void forgetErrors(const Asset& asset);
 
   // soak_steps.cpp: what a host may do
   void step();

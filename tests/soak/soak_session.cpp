@@ -223,9 +223,16 @@ void Soak::repair() {
     // One that is under way still must end first.
     if (!streamer_->reload(asset.id, sourceOf(asset, packs_[content].bytes))) continue;
     asset.contents.push_back(content);
+    forgetErrors(asset);
     asset.damaged = false;
     ++counts_.reloads;
   }
+}
+
+// Of another pack the same pages are others.
+void Soak::forgetErrors(const Asset& asset) {
+  const std::string prefix = fmt::format("{} ", asset.id.value);
+  std::erase_if(told_, [&](const std::string& key) { return key.starts_with(prefix); });
 }
 
 void Soak::takeErrors() {

@@ -214,13 +214,15 @@ void Soak::reloadAsset() {
   faulty_ = faulty_ || bad;
   if (bad && config_.verify == runtime::Verify::never) comparable_ = false;
   if (!done) {
-    const bool underWay = asset.contents.size() > 1;
+    // A reload by the same content is not seen to be over.
+    const bool underWay = done.error().message.find("is being reloaded") != std::string::npos;
     if (!faulty_ && comfortable_ && !underWay) fail("a sound pack is refused: " + done.error().message);
     return;
   }
   // Faults may let even a sound one fail, so the next drain does it once more.
   asset.damaged = asset.damaged || bad || faulty_;
   asset.contents.push_back(content);
+  forgetErrors(asset);
   for (Actor& actor : actors_) {
     if (&assets_[actor.asset] == &asset && packs_[content].frames != packs_[now].frames) {
       actor.clock.forget();

@@ -35,9 +35,9 @@ class ToldPages {
  public:
   // Whether it is the first time: that a page cannot be read does not hide that it is damaged.
   bool insert(const std::shared_ptr<OpenPack>& pack, std::uint32_t page, bool damaged) {
+    std::erase_if(told_, [](const auto& of) { return of.first.expired(); });
     return told_[pack].insert({page, damaged}).second;
   }
-  void forget(const std::shared_ptr<OpenPack>& pack) { told_.erase(pack); }
 
  private:
   std::map<std::weak_ptr<const OpenPack>, std::set<std::pair<std::uint32_t, bool>>, std::owner_less<>> told_;

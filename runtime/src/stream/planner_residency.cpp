@@ -95,7 +95,6 @@ void Planner::closeClip(std::uint32_t number) {
     loading_ -= load.bytes;
     return true;
   });
-  told_.forget(clip.clip->pack);
   clip = {};
 }
 

@@ -83,7 +83,8 @@ Result<std::uint64_t> Uploader::completed() const {
   std::uint64_t value = 0;
   const VkResult result = device_.api.vkGetSemaphoreCounterValue(device_.host.device, semaphore_, &value);
   if (result != VK_SUCCESS) return vulkanError("vkGetSemaphoreCounterValue", result);
-  return value;
+  // The device may be done before vkQueueSubmit2() is, which still looks at the command buffers.
+  return std::min<std::uint64_t>(value, submitted_);
 }
 
 Result<void> Uploader::copy(Upload& upload) {

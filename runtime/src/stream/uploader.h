@@ -50,7 +50,7 @@ class Uploader {
   void finish();
   // What copy() last saw of completed(): where it ended early and this is outdated, it may go on.
   std::uint64_t seen() const { return seen_; }
-  // The last batch that the device has executed. Errors: vulkan.
+  // The last batch that the device has executed and that nobody is still submitting. Errors: vulkan.
   Result<std::uint64_t> completed() const;
   std::uint64_t closed() const { return closed_; }
   std::uint64_t submitted() const { return submitted_; }
