@@ -47,8 +47,8 @@ std::uint64_t bytesOf(const Transport& transport, PlannedClip& clip, std::uint32
 // What frames have room in, and how long they take it beside those that are drawn, in real seconds.
 struct Pace {
   std::uint64_t room = 0;  // bytes: the budget but for gaps that nothing fits into
-  double ahead = 0;   // from the order of a load to the update() that can draw it
-  double behind = 0;  // from the last update() that draws a frame until its memory is free
+  double ahead = 0;        // from the order of a load to the update() that can draw it
+  double behind = 0;       // from the last update() that draws a frame until its memory is free
 };
 
 class Detail {

@@ -274,7 +274,8 @@ bool Players::succeed(AssetId asset) {
     if (tracks_[view.clip].clip->asset != asset || view.successor == format::kNone) continue;
     view.phase = successorPhase(*tracks_[view.clip].clip, *tracks_[view.successor].clip, view);
     view.clip = std::exchange(view.successor, format::kNone);
-    players_[i] = {.fades = {}, .passed = 0, .near = format::kNone, .level = players_[i].level, .ideal = players_[i].ideal};
+    players_[i] = {
+        .fades = {}, .passed = 0, .near = format::kNone, .level = players_[i].level, .ideal = players_[i].ideal};
     shown_[i] = {};
     place(i);
   }
@@ -435,7 +436,8 @@ void Players::dropFrames() {
   }
   for (std::size_t i = 0; i < views_.size(); ++i) {
     shown_[i] = {};
-    players_[i] = {.fades = {}, .passed = 0, .near = format::kNone, .level = players_[i].level, .ideal = players_[i].ideal};
+    players_[i] = {
+        .fades = {}, .passed = 0, .near = format::kNone, .level = players_[i].level, .ideal = players_[i].ideal};
   }
   touchAll();
 }

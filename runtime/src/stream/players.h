@@ -39,10 +39,10 @@ struct Fade {
 // What an instance remembers from update to update.
 struct Player {
   Fade fades[2];
-  double passed = 0;  // volume seconds since something of the moment was drawn, or since a seek
+  double passed = 0;                   // volume seconds since something of the moment was drawn, or since a seek
   std::uint32_t near = format::kNone;  // the frame that began last
-  std::uint8_t level = 0;  // that planning chose
-  std::uint8_t ideal = 0;  // that the picture's size asks for
+  std::uint8_t level = 0;              // that planning chose
+  std::uint8_t ideal = 0;              // that the picture's size asks for
 };
 
 // Decides what `view` draws at its phase. `moved`: volume seconds since the last time; `seconds`: real ones.
