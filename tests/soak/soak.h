@@ -39,9 +39,10 @@ class Soak {
     runtime::AssetId id;
     // Packs that it may be made of now: more than one while a reload is under way.
     std::vector<std::size_t> contents;
-    std::string path;      // "": it comes from the disk
-    bool opening = false;  // state() has not said ready yet
-    bool damaged = false;  // some of its pages could not be had
+    std::string path;                      // "": it comes from the disk
+    bool opening = false;                  // state() has not said ready yet
+    bool damaged = false;                  // some of its pages could not be had
+    const format::Pack* before = nullptr;  // that a reload must have replaced
   };
   struct Actor {
     runtime::InstanceId id;

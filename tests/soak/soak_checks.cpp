@@ -122,7 +122,9 @@ void Soak::checkLayers(const runtime::Drawable& drawable) const {
 
 // Of an instance that is shown in full, what its frames must be follows from its time alone.
 void Soak::takeSnapshot() {
-  if (snapshot_ || actors_.empty() || !attached_ || viewed_ || !comparable_) return;
+  if (snapshot_ || !attached_ || viewed_ || !comparable_) return;
+  update(0);  // what is drawn is by the playback of the update before
+  if (actors_.empty()) return;
   const Actor& actor = actors_[below(static_cast<std::uint32_t>(actors_.size()))];
   const runtime::Drawable drawable = streamer_->drawable(actor.id);
   if (drawable.count == 0 || drawable.coarse || drawable.held) return;

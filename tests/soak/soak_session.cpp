@@ -163,7 +163,10 @@ void Soak::drain() {
     if (std::chrono::steady_clock::now() - begin > std::chrono::seconds(120)) failDrain();
     std::this_thread::sleep_for(std::chrono::microseconds(300));
   }
-  for (Asset& asset : assets_) asset.contents = {asset.contents.back()};
+  for (Asset& asset : assets_) {
+    asset.contents = {asset.contents.back()};
+    asset.before = nullptr;
+  }
   faulty_ = false;
   comfortable_ = comparable_ = true;
   told_.clear();
@@ -183,7 +186,7 @@ bool Soak::settled() {
   for (Asset& asset : assets_) {
     if (asset.opening || asset.damaged) return false;
     const format::Pack* pack = streamer_->pack(asset.id);
-    if (pack == nullptr || pack->fileSize() != packs_[asset.contents.back()].bytes.size()) return false;
+    if (pack == nullptr || pack == asset.before) return false;
   }
   return std::all_of(actors_.begin(), actors_.end(), [&](const Actor& actor) {
     if (!(actor.priority > 0)) return true;
@@ -221,9 +224,11 @@ void Soak::repair() {
     if (!asset.damaged || asset.opening) continue;
     const std::size_t content = asset.contents.back();
     // One that is under way still must end first.
+    const format::Pack* const before = streamer_->pack(asset.id);
     if (!streamer_->reload(asset.id, sourceOf(asset, packs_[content].bytes))) continue;
     asset.contents.push_back(content);
     forgetErrors(asset);
+    asset.before = before;
     asset.damaged = false;
     ++counts_.reloads;
   }
@@ -241,9 +246,13 @@ void Soak::takeErrors() {
     if (options_.trace) fmt::print(stderr, "  error: {}\n", error->message);
     if (!faulty_ && comfortable_) fail("an error where nothing was let fail: " + error->message);
     require(!error->message.empty() && error->message.find('\n') == std::string::npos, "an error is one line");
-    // What passes (a full memory, a read that fails) may come again; a page that is wrong stays wrong.
+    // What passes (a full memory, a read that fails) may come again; a page that is wrong stays wrong. Of a reload
+    // under way there are two packs.
+    const auto known =
+        std::find_if(assets_.begin(), assets_.end(), [&](const Asset& asset) { return asset.id == error->asset; });
+    const bool one = known != assets_.end() && known->contents.size() == 1;
     const std::string key = fmt::format("{} {} {}", error->asset.value, error->volume, error->page.value_or(0));
-    if (error->page && error->code == runtime::ErrorCode::pack && !told_.insert(key).second) {
+    if (one && error->page && error->code == runtime::ErrorCode::pack && !told_.insert(key).second) {
       fail("an error that the host knows: " + error->message);
     }
     for (Asset& asset : assets_) {

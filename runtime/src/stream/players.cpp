@@ -338,10 +338,11 @@ std::size_t Players::take(std::span<Change> changes, Transport& transport) {
       freeTracks_.push_back(change.clip);
       continue;
     }
-    if (track.clip == nullptr || change.item >= track.slots.size()) {
+    if (change.item >= track.slots.size()) {
       if (change.frame != nullptr) transport.retire(std::move(change.frame));
       continue;
     }
+    // Of a closed clip too: until planning knows that it is, it may look at the frame.
     Track::Slot& slot = track.slots[change.item];
     switch (change.kind) {
       case Change::Kind::arrive:
