@@ -338,11 +338,8 @@ std::size_t Players::take(std::span<Change> changes, Transport& transport) {
       freeTracks_.push_back(change.clip);
       continue;
     }
-    if (change.item >= track.slots.size()) {
-      if (change.frame != nullptr) transport.retire(std::move(change.frame));
-      continue;
-    }
-    // Of a closed clip too: until planning knows that it is, it may look at the frame.
+    // What arrives for a closed clip stays: until planning knows that it is closed, it may look at the frame.
+    if (track.clip == nullptr && change.kind != Change::Kind::arrive) continue;
     Track::Slot& slot = track.slots[change.item];
     switch (change.kind) {
       case Change::Kind::arrive:
