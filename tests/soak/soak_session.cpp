@@ -187,6 +187,7 @@ bool Soak::settled() {
     if (asset.opening || asset.damaged) return false;
     const format::Pack* pack = streamer_->pack(asset.id);
     if (pack == nullptr || pack == asset.before) return false;
+    if (pack->fileSize() != packs_[asset.contents.back()].bytes.size()) return false;
   }
   return std::all_of(actors_.begin(), actors_.end(), [&](const Actor& actor) {
     if (!(actor.priority > 0)) return true;

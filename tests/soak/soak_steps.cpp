@@ -209,6 +209,7 @@ void Soak::reloadAsset() {
   const std::size_t content = now < 2 && chance(0.8) ? 1 - now : below(static_cast<std::uint32_t>(packs_.size()));
   const bool bad = chance(0.3);
   const runtime::PackSource source = sourceOf(asset, bad ? spoiled(packs_[content].bytes) : packs_[content].bytes);
+  const format::Pack* const before = streamer_->pack(asset.id);
   const auto done = streamer_->reload(asset.id, source);
   ++counts_.reloads;
   faulty_ = faulty_ || bad;
@@ -222,6 +223,7 @@ void Soak::reloadAsset() {
   // Faults may let even a sound one fail, so the next drain does it once more.
   asset.damaged = asset.damaged || bad || faulty_;
   asset.contents.push_back(content);
+  asset.before = before;
   forgetErrors(asset);
   for (Actor& actor : actors_) {
     if (&assets_[actor.asset] == &asset && packs_[content].frames != packs_[now].frames) {
