@@ -103,7 +103,7 @@ TEST_F(StreamTransport, LoadsWaitForRoomAndTellHowMuch) {
     return transport->wantedGpuBytes() != 0;
   });
   EXPECT_EQ(transport->stage(2), runtime::LoadStage::waitingForMemory);
-  EXPECT_LE(transport->wantedGpuBytes(), one);
+  EXPECT_LE(transport->wantedGpuBytes(), transport->cost(orderOf(pack, 2, 2)).gpu);
   transport->take(arrivals);
   EXPECT_TRUE(arrivals.empty());
   transport->retire(std::move(frames[0]));
