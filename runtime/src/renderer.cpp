@@ -25,12 +25,19 @@ bool sampled3D(const Device& device, VkFormat format) {
 }
 
 Result<void> describeDevice(Device& device, BlockUse use) {
+  auto allocations =
+      begin<VkPhysicalDeviceMaintenance3Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES);
+  auto buffers =
+      begin<VkPhysicalDeviceMaintenance4Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES);
   auto properties = begin<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
+  properties.pNext = &allocations;
+  allocations.pNext = &buffers;
   device.api.vkGetPhysicalDeviceProperties2(device.host.physicalDevice, &properties);
   if (properties.properties.apiVersion < VK_API_VERSION_1_3) {
     return failure(ErrorCode::unsupported, std::string(properties.properties.deviceName) + " has no Vulkan 1.3");
   }
   device.maxImageExtent3D = properties.properties.limits.maxImageDimension3D;
+  device.mostAllocation = std::min<std::uint64_t>(allocations.maxMemoryAllocationSize, buffers.maxBufferSize);
   device.imageGranularity = properties.properties.limits.bufferImageGranularity;
   device.api.vkGetPhysicalDeviceMemoryProperties(device.host.physicalDevice, &device.memory);
   device.bc7 = device.host.textureCompressionBc && sampled3D(device, VK_FORMAT_BC7_UNORM_BLOCK);

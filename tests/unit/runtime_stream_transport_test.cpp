@@ -131,6 +131,29 @@ TEST_F(StreamTransport, LoadsWaitForRoomAndTellHowMuch) {
   EXPECT_EQ(second.frame.error().code, ErrorCode::memory);
 }
 
+// However large the budget is, no block is larger than the device allocates at once.
+TEST_F(StreamTransport, BlocksAreNoLargerThanAnAllocationMayBe) {
+  const auto pack = openStream(streamPack(8, 400));
+  const auto renderer = makeRenderer();
+  StreamConfig config = smallConfig();
+  const std::uint64_t one = makeTransport(*renderer, config)->cost(orderOf(pack, 0, 1)).gpu;
+  const std::uint64_t most = (one + one / 2) >> 16 << 16;
+  runtime::deviceOf(*renderer).mostAllocation = most;
+  config.gpuBudget = 16 * one;
+  const auto transport = makeTransport(*renderer, config);
+  std::uint64_t before = 0;
+  std::vector<std::unique_ptr<runtime::ResidentFrame>> frames;
+  for (std::uint32_t i = 0; i < 6; ++i) {
+    auto arrival = loadOne(*transport, orderOf(pack, i, i + 1));
+    ASSERT_TRUE(arrival.frame) << arrival.frame.error().message;
+    const std::uint64_t now = transport->stats().gpuAllocated;
+    EXPECT_LE(now - before, most);
+    before = now;
+    frames.push_back(std::move(*arrival.frame));
+  }
+  EXPECT_GT(before, 3 * most);
+}
+
 // Everything at random: loads, cancels, evictions, budgets. The budgets hold, what arrives is right, and at the end
 // nothing is left.
 TEST_F(StreamTransport, RandomLoadsKeepToTheBudgetsAndLeaveNothing) {

@@ -218,7 +218,7 @@ std::uint64_t GpuHeap::newBlockBytes(std::uint64_t bytes) {
   if (room() < least) dropEmpty(true);
   // The host's budget for all of billow may be the tighter one.
   const std::uint64_t device = device_.budget - std::min<std::uint64_t>(device_.used, device_.budget);
-  const std::uint64_t most = std::min(room(), device) / kPage * kPage;
+  const std::uint64_t most = std::min({room(), device, device_.mostAllocation}) / kPage * kPage;
   if (most < least) return 0;
   return std::clamp((usual + kPage - 1) / kPage * kPage, least, most);
 }
