@@ -23,12 +23,11 @@ std::uint32_t bestLevel(const Track& track, std::uint32_t frame, std::uint32_t l
 
 class Chooser {
  public:
-  Chooser(Track& track, Player& player, Shown& shown, float seconds, std::uint64_t update)
+  Chooser(const Track& track, Player& player, Shown& shown, float seconds)
       : track_(track),
         player_(player),
         shown_(shown),
         seconds_(seconds),
-        update_(update),
         levels_(track.clip->levelCount()),
         level_(std::min<std::uint32_t>(player.level, levels_ - 1)) {}
 
@@ -94,18 +93,16 @@ class Chooser {
 
   void addLayer(std::uint32_t frame, std::uint32_t level, float weight, double carried) {
     const std::uint32_t item = frame * levels_ + level;
-    track_.slots[item].drawn = update_;
     shown_.items[shown_.count] = item;
     shown_.weights[shown_.count] = weight;
     shown_.advect[shown_.count] = static_cast<float>(carried);
     ++shown_.count;
   }
 
-  Track& track_;
+  const Track& track_;
   Player& player_;
   Shown& shown_;
   float seconds_;
-  std::uint64_t update_;
   std::uint32_t levels_;
   std::uint32_t level_;
   Fade next_[2];
@@ -127,7 +124,7 @@ std::uint32_t passedFrame(const Track& track, const InstanceView& view, Player& 
 }
 
 // Keeps what was drawn, as far as it is resident. Where it is given up, a coarser level of the same moment may be left.
-void hold(Track& track, Shown& shown, Player& player, std::uint64_t update) {
+void hold(const Track& track, Shown& shown, Player& player) {
   Shown kept = shown;
   kept.count = 0;
   kept.held = true;
@@ -140,7 +137,6 @@ void hold(Track& track, Shown& shown, Player& player, std::uint64_t update) {
       if (level == format::kNone) continue;
       item = frame * track.clip->levelCount() + level;
     }
-    track.slots[item].drawn = update;
     kept.items[kept.count] = item;
     kept.weights[kept.count] = shown.weights[i];
     kept.advect[kept.count] = shown.advect[i];
@@ -156,11 +152,12 @@ void hold(Track& track, Shown& shown, Player& player, std::uint64_t update) {
 
 }  // namespace
 
-void chooseLayers(Track& track, const InstanceView& view, Player& player, Shown& shown, double moved, float seconds,
-                  std::uint64_t update) {
+void chooseLayers(const Track& track, const InstanceView& view, Player& player, Shown& shown, double moved,
+                  float seconds) {
+  player.steady.version = 0;
   const Moment moment = momentAt(track.clip->timeline, view.playback.loop, view.phase, player.near);
   player.near = moment.a;
-  Chooser chooser(track, player, shown, seconds, update);
+  Chooser chooser(track, player, shown, seconds);
   const bool hold_ = view.playback.interpolation == Interpolation::hold;
   const bool one = hold_ || moment.fraction <= 0 || track.clip->same[moment.a] == track.clip->same[moment.b];
   const std::uint32_t bestA = chooser.best(moment.a);
@@ -168,7 +165,7 @@ void chooseLayers(Track& track, const InstanceView& view, Player& player, Shown&
   if (bestA == format::kNone && bestB == format::kNone) {
     player.passed += std::abs(moved);
     const std::uint32_t frame = passedFrame(track, view, player, chooser);
-    if (frame == format::kNone) return hold(track, shown, player, update);
+    if (frame == format::kNone) return hold(track, shown, player);
     chooser.begin();
     chooser.add(frame, chooser.best(frame), 1, 0);
     chooser.end();
@@ -185,6 +182,34 @@ void chooseLayers(Track& track, const InstanceView& view, Player& player, Shown&
   shown.time = moment.time;
   shown.held = false;
   player.passed = 0;
+  // On the way back of a ping-pong time and phase go apart; a fade changes weights by itself, and ends.
+  const std::uint32_t all = one ? 1 : 2;
+  const bool back = view.playback.loop == Loop::pingPong && view.phase > track.clip->timeline.last();
+  if (back || shown.count != all || player.fades[0].progress < 1 || player.fades[1].progress < 1) return;
+  if (!hold_ && moment.fraction <= 0) return;
+  player.steady = {.from = track.clip->timeline.start(moment.a),
+                   .until = track.clip->timeline.start(moment.a + 1),
+                   .version = track.version,
+                   .carries = advect};
+}
+
+bool goOn(const Track& track, const InstanceView& view, Player& player, Shown& shown, float seconds) {
+  const Steady& steady = player.steady;
+  if (steady.version != track.version || !(view.phase > steady.from) || !(view.phase < steady.until)) return false;
+  const double since = view.phase - steady.from;
+  if (shown.count == 2) {
+    const float fraction = std::min(static_cast<float>(since / (steady.until - steady.from)), 0.99999994f);
+    if (fraction <= 0) return false;
+    shown.weights[0] = 1 - fraction;
+    shown.weights[1] = fraction;
+  }
+  if (steady.carries) {
+    shown.advect[0] = static_cast<float>(since);
+    if (shown.count == 2) shown.advect[1] = -static_cast<float>(steady.until - view.phase);
+  }
+  for (Fade& fade : player.fades) fade.seen = std::min(fade.seen + seconds, kFadeSeconds);
+  shown.time = view.phase;
+  return true;
 }
 
 }  // namespace billow::runtime

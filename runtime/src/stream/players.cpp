@@ -42,6 +42,7 @@ std::uint32_t Players::openClip(std::shared_ptr<const Clip> clip) {
     freeTracks_.pop_back();
   }
   tracks_[number].slots = std::vector<Track::Slot>(clip->items());
+  ++tracks_[number].version;
   notices_.push_back({.kind = Notice::Kind::opened, .clip = number, .item = 0, .opened = clip});
   tracks_[number].clip = std::move(clip);
   return number;
@@ -171,6 +172,7 @@ void Players::setPlayback(InstanceId id, const Playback& playback) {
     players_[index].passed = 0;
   }
   view.playback = playback;
+  players_[index].steady = {};
   touch(index);
 }
 
@@ -274,8 +276,12 @@ bool Players::succeed(AssetId asset) {
     if (tracks_[view.clip].clip->asset != asset || view.successor == format::kNone) continue;
     view.phase = successorPhase(*tracks_[view.clip].clip, *tracks_[view.successor].clip, view);
     view.clip = std::exchange(view.successor, format::kNone);
-    players_[i] = {
-        .fades = {}, .passed = 0, .near = format::kNone, .level = players_[i].level, .ideal = players_[i].ideal};
+    players_[i] = {.steady = {},
+                   .fades = {},
+                   .passed = 0,
+                   .near = format::kNone,
+                   .level = players_[i].level,
+                   .ideal = players_[i].ideal};
     shown_[i] = {};
     place(i);
   }
@@ -326,6 +332,7 @@ std::size_t Players::take(std::span<Change> changes, Transport& transport) {
       if (index != format::kNone) {
         players_[index].level = static_cast<std::uint8_t>(change.item);
         players_[index].ideal = static_cast<std::uint8_t>(change.ideal);
+        players_[index].steady = {};
       }
       continue;
     }
@@ -340,6 +347,7 @@ std::size_t Players::take(std::span<Change> changes, Transport& transport) {
     }
     // What arrives for a closed clip stays: until planning knows that it is closed, it may look at the frame.
     if (track.clip == nullptr && change.kind != Change::Kind::arrive) continue;
+    ++track.version;
     Track::Slot& slot = track.slots[change.item];
     switch (change.kind) {
       case Change::Kind::arrive:
@@ -369,7 +377,7 @@ std::size_t Players::take(std::span<Change> changes, Transport& transport) {
   return changes.size();
 }
 
-void Players::advance(double seconds, std::uint64_t update) {
+void Players::advance(double seconds) {
   const auto passing = static_cast<float>(std::max(seconds, kLeastPassing));
   count_ = {};
   for (std::size_t i = 0; i < views_.size(); ++i) {
@@ -379,7 +387,9 @@ void Players::advance(double seconds, std::uint64_t update) {
     view.phase = wrapPhase(track.clip->timeline, view.playback.loop, view.phase + moved);
     Shown& shown = shown_[i];
     const std::uint32_t before = players_[i].near;
-    chooseLayers(track, view, players_[i], shown, moved, passing, update);
+    if (!goOn(track, view, players_[i], shown, passing)) {
+      chooseLayers(track, view, players_[i], shown, moved, passing);
+    }
     if (!(view.priority > 0)) continue;
     ++count_.all;
     if (shown.count == 0) ++count_.empty;
@@ -389,14 +399,24 @@ void Players::advance(double seconds, std::uint64_t update) {
   }
 }
 
-void Players::giveBack(Transport& transport, std::uint64_t update) {
+void Players::giveBack(Transport& transport) {
+  if (asked_.empty()) return;
+  ++givenBack_;
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    const Shown& shown = shown_[i];
+    for (std::uint32_t layer = 0; layer < shown.count; ++layer) {
+      tracks_[views_[i].clip].slots[shown.items[layer]].drawn = givenBack_;
+    }
+  }
   for (const auto& [clip, item] : asked_) {
     Track::Slot& slot = tracks_[clip].slots[item];
     if (slot.frame == nullptr) continue;
-    const bool drawn = slot.drawn == update;
+    const bool drawn = slot.drawn == givenBack_;
     notices_.push_back(
         {.kind = drawn ? Notice::Kind::refused : Notice::Kind::retired, .clip = clip, .item = item, .opened = {}});
-    if (!drawn) retire(std::move(slot.frame), transport);
+    if (drawn) continue;
+    retire(std::move(slot.frame), transport);
+    ++tracks_[clip].version;
   }
   asked_.clear();
 }
@@ -430,12 +450,17 @@ void Players::dropFrames() {
       continue;
     }
     track.slots = std::vector<Track::Slot>(track.clip->items());
+    ++track.version;
     notices_.push_back({.kind = Notice::Kind::opened, .clip = number, .item = 0, .opened = track.clip});
   }
   for (std::size_t i = 0; i < views_.size(); ++i) {
     shown_[i] = {};
-    players_[i] = {
-        .fades = {}, .passed = 0, .near = format::kNone, .level = players_[i].level, .ideal = players_[i].ideal};
+    players_[i] = {.steady = {},
+                   .fades = {},
+                   .passed = 0,
+                   .near = format::kNone,
+                   .level = players_[i].level,
+                   .ideal = players_[i].ideal};
   }
   touchAll();
 }

@@ -20,11 +20,12 @@ inline constexpr float kFadeSeconds = 0.2f;
 struct Track {
   struct Slot {
     std::unique_ptr<ResidentFrame> frame;
-    std::uint64_t drawn = 0;  // the update that drew it last
+    std::uint64_t drawn = 0;  // the last giveBack() that found it drawn
     bool failed = false;
   };
   std::shared_ptr<const Clip> clip;  // null: closed
   std::vector<Slot> slots;
+  std::uint64_t version = 1;  // another one when a slot gets another frame
 };
 
 // A frame that is drawn, on its way from one level to another.
@@ -36,8 +37,16 @@ struct Fade {
   float seen = 0;    // seconds since it was drawn first
 };
 
+// Phases, without their ends, within which nothing that is drawn changes but weights: most updates of most instances.
+struct Steady {
+  double from = 0, until = 0;
+  std::uint64_t version = 0;  // of the track; 0: there are none
+  bool carries = false;
+};
+
 // What an instance remembers from update to update.
 struct Player {
+  Steady steady;
   Fade fades[2];
   double passed = 0;                   // volume seconds since something of the moment was drawn, or since a seek
   std::uint32_t near = format::kNone;  // the frame that began last
@@ -46,8 +55,10 @@ struct Player {
 };
 
 // Decides what `view` draws at its phase. `moved`: volume seconds since the last time; `seconds`: real ones.
-void chooseLayers(Track& track, const InstanceView& view, Player& player, Shown& shown, double moved, float seconds,
-                  std::uint64_t update);
+void chooseLayers(const Track& track, const InstanceView& view, Player& player, Shown& shown, double moved,
+                  float seconds);
+// The same in short where it can be, else false.
+bool goOn(const Track& track, const InstanceView& view, Player& player, Shown& shown, float seconds);
 
 // A clip, and the one that is to take its place.
 struct Succession {
@@ -101,8 +112,8 @@ class Players {
   // The parts of an update(), in this order.
   // Gives how many of the changes it took: what follows a frame that may not be drawn yet waits with it.
   std::size_t take(std::span<Change> changes, Transport& transport);
-  void advance(double seconds, std::uint64_t update);
-  void giveBack(Transport& transport, std::uint64_t update);
+  void advance(double seconds);
+  void giveBack(Transport& transport);
   // Adds what planning does not know to what of a report it has not taken.
   void fill(Report& report);
 
@@ -138,6 +149,7 @@ class Players {
   std::vector<std::uint32_t> freeHandles_;
   std::vector<Notice> notices_;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> asked_;  // clip and item that planning asks back
+  std::uint64_t givenBack_ = 0;                                 // times
   RetiredCount retired_;
   InstanceCount count_;
 };

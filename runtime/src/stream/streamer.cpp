@@ -326,7 +326,7 @@ class StreamerImpl final : public Streamer {
     now_ += std::max(seconds, kLeastPassing);
     ++stats_.updates;
     bury();
-    if (transport_ == nullptr) return players_.advance(seconds, stats_.updates);
+    if (transport_ == nullptr) return players_.advance(seconds);
     transport_->update();
     planning_.take(changes_, met_, plan_);
     const std::size_t taken = players_.take(changes_, *transport_);
@@ -334,8 +334,8 @@ class StreamerImpl final : public Streamer {
     takeErrors();
     takeOpened();
     finishReloads(seconds);
-    players_.advance(seconds, stats_.updates);
-    players_.giveBack(*transport_, stats_.updates);
+    players_.advance(seconds);
+    players_.giveBack(*transport_);
     if (planning_.wantsReport()) {
       fillReport(info);
       planning_.publish(report_);
