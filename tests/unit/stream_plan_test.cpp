@@ -151,7 +151,7 @@ TEST_F(StreamPlan, ReportsTellPlanningWhatThereIs) {
   }
 }
 
-// The short way gives what the long one gives, whenever it may be taken, and that is most of the time.
+// The short way gives what the long one gives, whenever it may be taken.
 TEST_F(StreamPlan, GoingOnDrawsWhatChoosingAnewWould) {
   std::vector<format::FrameRecord> records(12);
   for (std::size_t i = 0; i < 12; ++i) records[i].time = static_cast<double>(i) / 24;
@@ -177,6 +177,7 @@ TEST_F(StreamPlan, GoingOnDrawsWhatChoosingAnewWould) {
         }
         const double moved = random() % 50 == 0 ? 0.2 : 1.0 / 144;
         view.phase = wrapPhase(clip->timeline, loop, view.phase + moved);
+        if (random() % 200 == 0) view.phase = clip->timeline.last();
         runtime::Player other = player;
         runtime::Shown wanted = shown;
         chooseLayers(track, view, other, wanted, moved, 1.0f / 144);
@@ -200,7 +201,7 @@ TEST_F(StreamPlan, GoingOnDrawsWhatChoosingAnewWould) {
       }
     }
   }
-  EXPECT_GT(shorter, 700u);
+  EXPECT_GT(shorter, 400u);
 }
 
 TEST_F(StreamPlan, OnlyAShrunkBudgetTakesTheLastFrameOfAnInstance) {

@@ -184,7 +184,7 @@ void chooseLayers(const Track& track, const InstanceView& view, Player& player, 
   player.passed = 0;
   // On the way back of a ping-pong time and phase go apart; a fade changes weights by itself, and ends.
   const std::uint32_t all = one ? 1 : 2;
-  const bool back = view.playback.loop == Loop::pingPong && view.phase > track.clip->timeline.last();
+  const bool back = view.playback.loop == Loop::pingPong && view.phase >= track.clip->timeline.last();
   if (back || shown.count != all || player.fades[0].progress < 1 || player.fades[1].progress < 1) return;
   if (!hold_ && moment.fraction <= 0) return;
   player.steady = {.from = track.clip->timeline.start(moment.a),
