@@ -74,6 +74,14 @@ void Players::touchAll() {
   for (std::uint32_t i = 0; i < views_.size(); ++i) touch(i);
 }
 
+void Players::forgetDrawn(std::uint32_t index) {
+  shown_[index] = {};
+  Player player;
+  player.level = players_[index].level;
+  player.ideal = players_[index].ideal;
+  players_[index] = player;
+}
+
 void Players::setPriority(InstanceId id, float priority) {
   const std::uint32_t index = indexOf(id);
   if (index == format::kNone || !std::isfinite(priority)) return;
@@ -276,13 +284,7 @@ bool Players::succeed(AssetId asset) {
     if (tracks_[view.clip].clip->asset != asset || view.successor == format::kNone) continue;
     view.phase = successorPhase(*tracks_[view.clip].clip, *tracks_[view.successor].clip, view);
     view.clip = std::exchange(view.successor, format::kNone);
-    players_[i] = {.steady = {},
-                   .fades = {},
-                   .passed = 0,
-                   .near = format::kNone,
-                   .level = players_[i].level,
-                   .ideal = players_[i].ideal};
-    shown_[i] = {};
+    forgetDrawn(i);
     place(i);
   }
   return true;
@@ -453,15 +455,7 @@ void Players::dropFrames() {
     ++track.version;
     notices_.push_back({.kind = Notice::Kind::opened, .clip = number, .item = 0, .opened = track.clip});
   }
-  for (std::size_t i = 0; i < views_.size(); ++i) {
-    shown_[i] = {};
-    players_[i] = {.steady = {},
-                   .fades = {},
-                   .passed = 0,
-                   .near = format::kNone,
-                   .level = players_[i].level,
-                   .ideal = players_[i].ideal};
-  }
+  for (std::uint32_t i = 0; i < views_.size(); ++i) forgetDrawn(i);
   touchAll();
 }
 

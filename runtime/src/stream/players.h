@@ -130,6 +130,8 @@ class Players {
   std::uint32_t indexOf(InstanceId id) const;
   void touch(std::uint32_t index);
   void touchAll();
+  // All but the levels that planning chose.
+  void forgetDrawn(std::uint32_t index);
   // What depends on transform and clip.
   void place(std::uint32_t index);
   void removeAt(std::uint32_t index);
