@@ -144,7 +144,7 @@ class FakeTransport final : public runtime::Transport {
     if (!arrivals_.empty()) wake_.call(wake_.user);
   }
 
-  void retire(std::unique_ptr<runtime::ResidentFrame> frame) override {
+  void retire(std::unique_ptr<runtime::ResidentFrame>&& frame) override {
     ASSERT_NE(frame, nullptr);
     retired_.emplace_back(updates_, std::move(frame));
   }

@@ -50,7 +50,7 @@ class InstantTransport final : public runtime::Transport {
     ++updates_;
     while (!retired_.empty() && retired_.front().first + config_.framesInFlight <= updates_) retired_.pop_front();
   }
-  void retire(std::unique_ptr<runtime::ResidentFrame> frame) override {
+  void retire(std::unique_ptr<runtime::ResidentFrame>&& frame) override {
     retired_.emplace_back(updates_, std::move(frame));
   }
   runtime::UploadWait wait() const override { return {}; }

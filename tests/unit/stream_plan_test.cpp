@@ -481,6 +481,33 @@ TEST_F(StreamPlan, AFastLoopThatDoesNotFitIsCoarserButNeverLate) {
   }
 }
 
+// A load that takes a second is late, but not too slow where enough of them are under way: its level is waited for.
+TEST_F(StreamPlan, LatencyAloneTakesNoDetail) {
+  const PackFile file(sequencePack(48, evenBricks));
+  FakeStream stream({.gpuBudget = 4 * bytesOfAll(file), .prefetchSeconds = 2});
+  stream.transport().latency = 60;
+  stream.transport().parallel = 64;
+  const InstanceId id = add(stream, open(stream, file), {});
+  stream.update(1200, kTick);
+  int coarse = 0;
+  for (int i = 0; i < 240; ++i) {
+    stream.update(kTick);
+    coarse += stream->drawable(id).coarse || stream->drawable(id).held;
+  }
+  EXPECT_EQ(coarse, 0);
+}
+
+// What has ended needs its last frame, and not those before.
+TEST_F(StreamPlan, WhatHasEndedIsAsFineAsItsFrameFits) {
+  const PackFile file(sequencePack(12, [](std::uint32_t) { return 200; }));
+  FakeStream stream({.gpuBudget = bytesOfAll(file) / 12 * 8 / 5});
+  const InstanceId id = add(stream, open(stream, file), {.speed = 4, .loop = Loop::once});
+  stream.update(60 * 40, kTick);
+  EXPECT_GT(stream->drawable(id).count, 0u);
+  EXPECT_FALSE(stream->drawable(id).coarse);
+  EXPECT_FALSE(stream->drawable(id).held);
+}
+
 TEST_F(StreamPlan, FramesThatNeverComeAreLateOnceEach) {
   const PackFile file(sequencePack(12, evenBricks));
   FakeStream stream;

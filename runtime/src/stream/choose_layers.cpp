@@ -128,6 +128,7 @@ void hold(const Track& track, Shown& shown, Player& player) {
   Shown kept = shown;
   kept.count = 0;
   kept.held = true;
+  kept.coarse = false;
   float sum = 0;
   for (std::uint32_t i = 0; i < shown.count; ++i) {
     std::uint32_t item = shown.items[i];
@@ -137,6 +138,7 @@ void hold(const Track& track, Shown& shown, Player& player) {
       if (level == format::kNone) continue;
       item = frame * track.clip->levelCount() + level;
     }
+    kept.coarse = kept.coarse || track.clip->levelOf(item) > player.ideal;
     kept.items[kept.count] = item;
     kept.weights[kept.count] = shown.weights[i];
     kept.advect[kept.count] = shown.advect[i];

@@ -11,9 +11,10 @@ constexpr float kLevelPause = 1;     // seconds between changes of an instance's
 constexpr float kLongestPause = 16;  // where the budget takes the finer level back again and again
 constexpr double kFull = 0.95;       // of the budget, for what must be there at one time
 constexpr double kFinerOnlyBelow = 0.75;
-constexpr double kCoarserBelow = 0.8;      // pixels a voxel of the coarser level
-constexpr double kFinerAbove = 1.25;       // pixels a voxel of the present level
-constexpr double kSettles = 0.5;           // seconds after a change of level in which its frames may still be coming
+constexpr double kCoarserBelow = 0.8;  // pixels a voxel of the coarser level
+constexpr double kFinerAbove = 1.25;   // pixels a voxel of the present level
+// Seconds, beyond those of a load, after a change of level or a seek in which frames may still be coming.
+constexpr double kSettles = 0.5;
 constexpr double kStarved = 0.25;          // seconds without its level, of late, after which a coarser one is taken
 constexpr double kForgets = 0.25;          // of each second in which it was there
 constexpr double kLongestPass = 0.1;       // seconds between passes that are counted; a game may hang for more
@@ -96,7 +97,7 @@ void Detail::gatherNeeded(const InstanceView& instance, const Clip& clip, const 
   if (!hold) add(moment.b);
   const double speed = std::abs(playback.speed);
   for (const bool back : {false, true}) {
-    if (speed == 0) break;
+    if (stands(clip.timeline, playback, instance.phase)) break;
     Walk walk(clip.timeline, playback.loop, instance.phase, (playback.speed > 0) != back);
     for (std::uint32_t i = 0; i < kMostNeeded && walk.next(); ++i) {
       const bool always = !back && i == 0;
@@ -109,14 +110,22 @@ void Detail::gatherNeeded(const InstanceView& instance, const Clip& clip, const 
 }
 
 // Whether its level does not come in time, though there is room for it.
-bool Detail::starves(const Snapshot& snapshot, const InstanceView& instance, const Clip& clip, State& state) const {
+bool Detail::starves(const Snapshot& snapshot, const InstanceView& instance, const PlannedClip& clip, const Pace& pace,
+                     State& state) const {
   const double passed = std::clamp(snapshot.now - state.seen, 0.0, kLongestPass);
   state.seen = snapshot.now;
+  if (state.seeks != instance.seeks) state.sought = snapshot.now;
+  state.seeks = instance.seeks;
   bool missing = instance.held;
   for (std::uint32_t i = 0; i < instance.drawnCount; ++i) {
-    missing = missing || clip.levelOf(instance.drawn[i]) > state.level;
+    const std::uint32_t wanted = clip.clip->item(clip.clip->frameOf(instance.drawn[i]), state.level);
+    // What is damaged will not come, however coarse the others are.
+    missing = missing || (clip.clip->levelOf(instance.drawn[i]) > state.level && !clip.items[wanted].corrupt);
   }
-  if (instance.playback.speed == 0 || snapshot.now - state.changed < kSettles) missing = false;
+  const double since = snapshot.now - std::max(state.changed, state.sought);
+  if (since < kSettles + pace.ahead || stands(clip.clip->timeline, instance.playback, instance.phase)) {
+    missing = false;
+  }
   state.starved = std::clamp(state.starved + (missing ? passed : -kForgets * passed), 0.0, 2 * kStarved);
   if (state.starved < kStarved) return false;
   state.starved = 0;
@@ -189,7 +198,7 @@ void Detail::choose(const Snapshot& snapshot, std::vector<PlannedClip>& clips, c
     };
     std::uint32_t fitting = finest(kFull * budget);
     std::uint32_t level = std::min<std::uint32_t>(state.level, last);
-    if (starves(snapshot, instance, *clip.clip, state)) fitting = std::max(fitting, std::min(level + 1, last));
+    if (starves(snapshot, instance, clip, pace, state)) fitting = std::max(fitting, std::min(level + 1, last));
     if (fresh || fitting > level) {
       // Taken back soon after it was given: the next try waits for longer.
       if (!fresh && snapshot.now - state.changed < 4.0 * static_cast<double>(state.pause)) {

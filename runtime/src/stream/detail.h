@@ -78,11 +78,14 @@ class Detail {
     double changed = -1e9;  // when it changed
     double seen = 0;        // when the pass before was
     double starved = 0;     // seconds of late in which its level was not there to be drawn
+    double sought = -1e9;   // when it was sent elsewhere
+    std::uint32_t seeks = 0;
   };
   State& stateOf(const InstanceView& instance);
   void rank(const Snapshot& snapshot);
   void gatherNeeded(const InstanceView& instance, const Clip& clip, const Pace& pace, Ranked& ranked);
-  bool starves(const Snapshot& snapshot, const InstanceView& instance, const Clip& clip, State& state) const;
+  bool starves(const Snapshot& snapshot, const InstanceView& instance, const PlannedClip& clip, const Pace& pace,
+               State& state) const;
 
   std::uint64_t budget_ = 0;   // of the pass before
   std::vector<State> states_;  // by handle slot

@@ -28,6 +28,7 @@ struct InstanceMoment {
   double phase = 0;
   std::array<std::uint32_t, kMostLayers> drawn{};  // items
   std::uint32_t drawnCount = 0;
+  std::uint32_t seeks = 0;  // how often it was sent elsewhere
   bool held = false;
 };
 
@@ -90,11 +91,12 @@ struct Snapshot : Situation {
 // From planning: what the frame thread takes in at its next update.
 struct Change {
   enum class Kind {
+    none,     // it has been taken
     arrive,   // `frame` is resident, in place of what the item had before
     evict,    // give the item's frame back unless it is drawn; a Notice says which
     force,    // give it back though it is drawn, unless an instance has nothing else
     seize,    // give it back whatever it is drawn for
-    discard,  // `frame` is of a clip that is closed
+    discard,  // nobody wants `frame` any more
     level,    // the instance is to be drawn at this level, while the picture asks for `ideal`
     fail,     // the item will not come
     closed,   // nothing more comes for the clip's number

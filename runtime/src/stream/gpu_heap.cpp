@@ -142,6 +142,11 @@ Result<std::unique_ptr<HeapMemory>> GpuHeap::allocate(std::uint64_t bufferBytes,
                                             " bytes of GPU memory, which the " + std::to_string(budget_) +
                                             " of gpuBudget do not hold");
     }
+    if (std::max(aligned(bufferBytes), aligned(image.size)) > device_.mostAllocation / kPage * kPage) {
+      return failure(ErrorCode::budget, "the frame takes more GPU memory than the " +
+                                            std::to_string(device_.mostAllocation) +
+                                            " bytes that the device allocates at once");
+    }
     for (const auto& [part, needed, alignment] : {std::tuple{&memory->buffer, aligned(bufferBytes), granule_},
                                                   std::tuple{&memory->atlas, aligned(image.size), image.alignment}}) {
       if (needed == 0) continue;

@@ -46,7 +46,9 @@ class ToldPages {
 class Planner {
  public:
   Planner(Transport& transport, const StreamConfig& config, ToldPages& told)
-      : transport_(transport), config_(config), told_(told) {}
+      : transport_(transport), config_(config), told_(told) {
+    loads_.reserve(kMostLoads);
+  }
 
   void pass(Snapshot& snapshot, std::vector<Change>& changes, std::vector<StreamError>& errors);
   const PlanStats& stats() const { return stats_; }

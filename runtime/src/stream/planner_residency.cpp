@@ -51,6 +51,7 @@ std::uint64_t Planner::leavingBytes() const {
 void Planner::takeNotices(Snapshot& snapshot, std::vector<Change>& changes) {
   std::erase_if(leaving_,
                 [&](const Leaving& frame) { return frame.update + config_.framesInFlight < snapshot.update; });
+  changes.reserve(changes.size() + snapshot.notices.size());
   for (Notice& notice : snapshot.notices) {
     if (notice.clip >= clips_.size()) clips_.resize(notice.clip + 1);
     // A pass that ran out of memory has dealt with it.
@@ -103,6 +104,7 @@ void Planner::takeArrivals(double now, std::vector<Change>& changes, std::vector
   // Where memory is short here, they are still there in the next pass: the device may be writing the frames.
   changes.reserve(changes.size() + arrivals_.size());
   leaving_.reserve(leaving_.size() + 2 * arrivals_.size());
+  residents_.reserve(residents_.size() + arrivals_.size());
   while (!arrivals_.empty()) {
     Arrival arrival = std::move(arrivals_.back());
     arrivals_.pop_back();
@@ -123,7 +125,7 @@ void Planner::takeArrivals(double now, std::vector<Change>& changes, std::vector
     clips_[load.clip].items[load.item].ticket = 0;
     const double took = now - load.since;
     latency_ += 0.25 * (took - latency_);
-    if (!load.waited) quickest_ = std::min(took, quickest_.value_or(took) + 0.05 * took);
+    if (!load.waited && arrival.frame) quickest_ = std::min(took, quickest_.value_or(took) + 0.05 * took);
     if (arrival.frame) {
       arrived(load, arrival, changes);
     } else {

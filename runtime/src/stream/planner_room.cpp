@@ -130,10 +130,10 @@ void Planner::measureSlack() {
 
 void Planner::evict(std::uint32_t clip, std::uint32_t number, Change::Kind kind, std::vector<Change>& changes) {
   Item& item = clips_[clip].items[number];
+  changes.push_back({.kind = kind, .clip = clip, .item = number, .instance = {}, .frame = {}});
   item.leaving = true;
   resident_ -= item.bytes;
   asked_ += item.bytes;
-  changes.push_back({.kind = kind, .clip = clip, .item = number, .instance = {}, .frame = {}});
 }
 
 // Drawn frames hold the room that others need: those go that no moment of now is made of, of the least important
@@ -146,16 +146,21 @@ void Planner::forceRoom(const Snapshot& snapshot, std::vector<Change>& changes) 
   const auto unwanted = [&](const Item& item) {
     return item.resident && !item.leaving && item.ticket == 0 && !(item.wanted == passes_ && wants_[item.want].fits);
   };
-  // Those without priority come after the ranked ones, and go first.
-  for (std::size_t i = snapshot.instances.size(); i-- > 0;) {
-    const auto& ranked = detail_.ranked();
-    const InstanceView& instance = i < ranked.size() ? snapshot.instances[ranked[i].instance] : snapshot.instances[i];
-    if (i >= ranked.size() && instance.priority > 0) continue;
+  const auto force = [&](const InstanceView& instance) {
     PlannedClip& clip = clips_[instance.clip];
-    if (clip.clip == nullptr || instance.drawnCount < (last ? 1u : 2u)) continue;
+    if (clip.clip == nullptr || instance.drawnCount < (last ? 1u : 2u)) return false;
     const std::uint32_t item = instance.drawn[instance.drawnCount - 1];
-    if (!unwanted(clip.items[item]) || (!last && clip.items[item].alone == passes_)) continue;
-    return evict(instance.clip, item, last ? Change::Kind::seize : Change::Kind::force, changes);
+    if (!unwanted(clip.items[item]) || (!last && clip.items[item].alone == passes_)) return false;
+    evict(instance.clip, item, last ? Change::Kind::seize : Change::Kind::force, changes);
+    return true;
+  };
+  // Those without priority go first.
+  for (const InstanceView& instance : snapshot.instances) {
+    if (!(instance.priority > 0) && force(instance)) return;
+  }
+  const auto& ranked = detail_.ranked();
+  for (std::size_t i = ranked.size(); i-- > 0;) {
+    if (force(snapshot.instances[ranked[i].instance])) return;
   }
 }
 

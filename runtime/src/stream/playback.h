@@ -50,6 +50,12 @@ inline bool goesForward(const Timeline& timeline, Loop loop, double phase, bool 
   return positive != back;
 }
 
+// Whether it draws the same moment until somebody changes that.
+inline bool stands(const Timeline& timeline, const Playback& playback, double phase) {
+  if (playback.speed == 0) return true;
+  return playback.loop == Loop::once && (playback.speed > 0 ? phase >= timeline.last() : phase <= 0);
+}
+
 // A walk through the intervals between frames in playing order, from the one that a phase lies in.
 class Walk {
  public:

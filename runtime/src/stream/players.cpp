@@ -67,7 +67,9 @@ const InstanceView* Players::find(InstanceId id) const {
 }
 
 void Players::touch(std::uint32_t index) {
-  if (std::exchange(touched_[index], std::uint8_t{1}) == 0) touches_.push_back(index);
+  if (touched_[index] != 0) return;
+  touches_.push_back(index);
+  touched_[index] = 1;
 }
 
 void Players::touchAll() {
@@ -189,6 +191,7 @@ void Players::seek(InstanceId id, double time) {
   if (index == format::kNone || !std::isfinite(time)) return;
   InstanceView& view = views_[index];
   view.phase = phaseAt(tracks_[view.clip].clip->timeline, view.playback.loop, time, view.phase);
+  ++view.seeks;
   players_[index].passed = 0;
 }
 
@@ -325,11 +328,13 @@ std::size_t Players::take(std::span<Change> changes, Transport& transport) {
   for (std::size_t i = 0; i < changes.size(); ++i) {
     Change& change = changes[i];
     if (change.kind == Change::Kind::arrive && !transport.admit(*change.frame)) return i;
-    if (change.kind == Change::Kind::discard) {
+    // Where memory is short in the middle, the rest is taken the next time, and this not again.
+    const Change::Kind kind = std::exchange(change.kind, Change::Kind::none);
+    if (kind == Change::Kind::discard) {
       transport.retire(std::move(change.frame));
       continue;
     }
-    if (change.kind == Change::Kind::level) {
+    if (kind == Change::Kind::level) {
       const std::uint32_t index = indexOf(change.instance);
       if (index != format::kNone) {
         players_[index].level = static_cast<std::uint8_t>(change.item);
@@ -339,7 +344,7 @@ std::size_t Players::take(std::span<Change> changes, Transport& transport) {
       continue;
     }
     Track& track = tracks_[change.clip];
-    if (change.kind == Change::Kind::closed) {
+    if (kind == Change::Kind::closed) {
       for (Track::Slot& slot : track.slots) {
         if (slot.frame != nullptr) retire(std::move(slot.frame), transport);
       }
@@ -348,10 +353,10 @@ std::size_t Players::take(std::span<Change> changes, Transport& transport) {
       continue;
     }
     // What arrives for a closed clip stays: until planning knows that it is closed, it may look at the frame.
-    if (track.clip == nullptr && change.kind != Change::Kind::arrive) continue;
+    if (track.clip == nullptr && kind != Change::Kind::arrive) continue;
     ++track.version;
     Track::Slot& slot = track.slots[change.item];
-    switch (change.kind) {
+    switch (kind) {
       case Change::Kind::arrive:
         if (slot.frame != nullptr) retire(std::move(slot.frame), transport);
         slot.frame = std::move(change.frame);
@@ -359,7 +364,7 @@ std::size_t Players::take(std::span<Change> changes, Transport& transport) {
       case Change::Kind::force:
       case Change::Kind::seize:
         if (slot.frame == nullptr) break;
-        if (change.kind == Change::Kind::force && isLast(change.clip, change.item)) {
+        if (kind == Change::Kind::force && isLast(change.clip, change.item)) {
           notices_.push_back({.kind = Notice::Kind::refused, .clip = change.clip, .item = change.item, .opened = {}});
           break;
         }
@@ -427,7 +432,11 @@ void Players::fill(Report& report) {
   report.moments.resize(views_.size());
   for (std::size_t i = 0; i < views_.size(); ++i) {
     const Shown& shown = shown_[i];
-    report.moments[i] = {.phase = views_[i].phase, .drawn = shown.items, .drawnCount = shown.count, .held = shown.held};
+    report.moments[i] = {.phase = views_[i].phase,
+                         .drawn = shown.items,
+                         .drawnCount = shown.count,
+                         .seeks = views_[i].seeks,
+                         .held = shown.held};
   }
   report.changed.reserve(report.changed.size() + touches_.size());
   for (const std::uint32_t index : touches_) {

@@ -19,6 +19,7 @@ namespace billow::runtime {
 namespace {
 
 constexpr double kLongestReload = 30;     // seconds until what is drawn must be resident of the new pack
+constexpr double kMostPassing = 60;       // seconds of an update that count for what is not play
 constexpr double kLongestUpdate = 0.1;    // seconds of them: while a game hangs, nothing it wants is loaded either
 constexpr std::size_t kMostErrors = 256;  // that the host has not taken yet; the newest are dropped
 
@@ -323,7 +324,7 @@ class StreamerImpl final : public Streamer {
 
   void advance(const UpdateInfo& info) {
     const double seconds = std::isfinite(info.seconds) ? std::max(info.seconds, 0.0) : 0;
-    now_ += std::max(seconds, kLeastPassing);
+    now_ += std::clamp(seconds, kLeastPassing, kMostPassing);
     ++stats_.updates;
     bury();
     if (transport_ == nullptr) return players_.advance(seconds);

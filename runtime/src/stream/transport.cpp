@@ -200,12 +200,14 @@ void TransportCore::take(std::vector<Arrival>& arrivals) {
       continue;
     }
     Arrival& arrival = arrivals.emplace_back(Arrival{.ticket = load.order.ticket, .frame = nullptr});
+    // It had arrived before its upload could not be submitted.
+    if (!load.error && failure_ && load.upload.batch > uploader_.submitted()) load.error = failure_;
     if (load.error) {
       if (load.error->issue) arrival.page = load.error->issue->place.page;
       arrival.frame = tl::unexpected(std::move(*load.error));
       if (load.frame != nullptr) kept_.push_back(std::move(load.frame));
     } else {
-      if (load.upload.batch <= executed_) taken_ = std::max<std::uint64_t>(taken_, load.upload.batch);
+      if (load.upload.batch <= executed_) cover(load.upload.batch);
       arrival.frame = std::move(load.frame);
     }
     tickets_.erase(load.order.ticket);
@@ -221,14 +223,20 @@ bool TransportCore::admit(const ResidentFrame& frame) {
   if (frame.memory_ == nullptr) return true;
   const std::uint64_t batch = static_cast<const HeapMemory&>(*frame.memory_).batch;
   if (batch > uploader_.submitted()) return false;
-  std::uint64_t taken = taken_;
-  while (taken < batch && !taken_.compare_exchange_weak(taken, batch)) {
-  }
+  cover(batch);
   return true;
 }
 
-void TransportCore::retire(std::unique_ptr<ResidentFrame> frame) {
+// Two threads raise it.
+void TransportCore::cover(std::uint64_t batch) {
+  std::uint64_t taken = taken_;
+  while (taken < batch && !taken_.compare_exchange_weak(taken, batch)) {
+  }
+}
+
+void TransportCore::retire(std::unique_ptr<ResidentFrame>&& frame) {
   const std::lock_guard lock(mutex_);
+  retired_.reserve(retired_.size() + 1);  // where that throws the caller still has the frame
   retired_.push_back({updates_, std::move(frame)});
 }
 
@@ -237,6 +245,7 @@ void TransportCore::update() {
   {
     const std::lock_guard lock(mutex_);
     ++updates_;
+    buried_.reserve(buried_.size() + retired_.size());
     std::erase_if(retired_, [&](Retired& retired) {
       if (retired.update + config_.framesInFlight > updates_) return false;
       buried_.push_back(std::move(retired.frame));

@@ -93,7 +93,7 @@ class Transport {
   // update().
   virtual bool admit(const ResidentFrame& frame) = 0;
   // The frame is not drawn from now on.
-  virtual void retire(std::unique_ptr<ResidentFrame> frame) = 0;
+  virtual void retire(std::unique_ptr<ResidentFrame>&& frame) = 0;
   virtual UploadWait wait() const = 0;
 
   virtual void setBudget(std::uint64_t gpuBytes, std::uint64_t cpuBytes) = 0;

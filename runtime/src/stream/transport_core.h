@@ -68,7 +68,7 @@ class TransportCore final : public Transport {
   bool mustLeave(const ResidentFrame& frame) const override;
   void update() override;
   bool admit(const ResidentFrame& frame) override;
-  void retire(std::unique_ptr<ResidentFrame> frame) override;
+  void retire(std::unique_ptr<ResidentFrame>&& frame) override;
   UploadWait wait() const override { return {uploader_.semaphore(), taken_}; }
   void setBudget(std::uint64_t gpuBytes, std::uint64_t cpuBytes) override;
   bool reserveCpu(std::uint64_t bytes) override { return share_.reserve(bytes); }
@@ -93,6 +93,7 @@ class TransportCore final : public Transport {
   Plan plan(const LoadOrder& order) const;
   Load* first(Step step);
   bool executed(const ResidentFrame& frame) const;
+  void cover(std::uint64_t batch);  // by wait()
   void add(const LoadOrder& order, Plan& plan, std::optional<Error> error);
 
   // Jobs; `core` is this.

@@ -51,7 +51,7 @@ Result<void> TransportCore::create() {
 void TransportCore::stop() {
   {
     const std::lock_guard lock(submitMutex_);
-    stopping_ = true;
+    if (std::exchange(stopping_, true)) return;
     submitAsked_.notify_all();
   }
   if (submitter_.joinable()) submitter_.join();
@@ -318,6 +318,7 @@ void TransportCore::bury(void* context) {
     const std::lock_guard lock(core.mutex_);
     const auto written = [&](const auto& frame) { return !core.executed(*frame); };
     const auto done = std::stable_partition(core.buried_.begin(), core.buried_.end(), written);
+    frames.reserve(static_cast<std::size_t>(core.buried_.end() - done) + core.loads_.size());
     std::move(done, core.buried_.end(), std::back_inserter(frames));
     core.buried_.erase(done, core.buried_.end());
     core.diesLater_ = false;

@@ -136,7 +136,7 @@ struct Playback {
 struct InstanceInfo {
   AssetId asset = {};
   std::uint32_t volume = 0;              // one that is a level of another is drawn as coarse as that, or coarser
-  std::optional<GridChoice> grids = {};  // of the volume; default: chooseGrids(). Its velocities come with advect alone
+  std::optional<GridChoice> grids = {};  // of the volume; default: chooseGrids(). Velocities are those by role
   double time = 0;                       // seconds from the volume's first frame
   Playback playback = {};
   // As MetavoxelVolume has it; decides only how large the instance is in the picture.
