@@ -81,8 +81,10 @@ class VirtualScreen {
     fcntl(ends[0], F_SETFD, FD_CLOEXEC);
     fcntl(ends[1], F_SETFD, FD_CLOEXEC);
     server_ = std::make_unique<Process>(
-        "Xvfb -displayfd " + std::to_string(ends[1]) + " -screen 0 " + std::to_string(width) + "x" +
-            std::to_string(height) + "x24 -nolisten tcp -fbdir '" + folder_.path().string() + "' >/dev/null 2>&1",
+        // Of this process alone: servers that look for a free number at the same time take each other's sockets away.
+        "Xvfb :" + std::to_string(1000 + getpid() % 50000) + " -displayfd " + std::to_string(ends[1]) + " -screen 0 " +
+            std::to_string(width) + "x" + std::to_string(height) + "x24 -nolisten tcp -fbdir '" +
+            folder_.path().string() + "' >/dev/null 2>&1",
         ends[1]);
     close(ends[1]);
     std::string number;
