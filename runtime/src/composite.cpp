@@ -128,7 +128,7 @@ class CompositorImpl final : public Compositor {
   Result<VkPipeline> pipeline(ColorFormat picture, ColorFormat targetFormat) {
     VkPipeline& place = pipelines_[static_cast<std::size_t>(picture) * 2 + static_cast<std::size_t>(targetFormat)];
     if (place != VK_NULL_HANDLE) return place;
-    auto made = makeComputePipeline(device_, layout_, codeOf(picture, targetFormat), {});
+    auto made = makeComputePipeline(device_, "billow composite", layout_, codeOf(picture, targetFormat), {});
     if (made) place = *made;
     return made;
   }

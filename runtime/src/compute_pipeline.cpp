@@ -2,9 +2,11 @@
 
 #include <vector>
 
+#include "debug.h"
+
 namespace billow::runtime {
 
-Result<VkPipeline> makeComputePipeline(const Device& device, VkPipelineLayout layout,
+Result<VkPipeline> makeComputePipeline(const Device& device, const char* name, VkPipelineLayout layout,
                                        std::span<const std::uint32_t> code, std::span<const std::uint32_t> constants) {
   std::vector<VkSpecializationMapEntry> entries;
   for (std::uint32_t i = 0; i < constants.size(); ++i) entries.push_back({i, 4 * i, 4});
@@ -29,6 +31,7 @@ Result<VkPipeline> makeComputePipeline(const Device& device, VkPipelineLayout la
                                                device.host.allocationCallbacks, &pipeline);
   device.api.vkDestroyShaderModule(device.host.device, module, device.host.allocationCallbacks);
   if (result != VK_SUCCESS) return vulkanError("vkCreateComputePipelines", result);
+  nameObject(device, VK_OBJECT_TYPE_PIPELINE, pipeline, name);
   return pipeline;
 }
 

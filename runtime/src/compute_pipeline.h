@@ -9,8 +9,9 @@
 
 namespace billow::runtime {
 
-// Specialization constant i is constants[i]; those that the shader lacks are passed over. The caller destroys it.
-Result<VkPipeline> makeComputePipeline(const Device& device, VkPipelineLayout layout,
+// `name` is what debuggers call it. Specialization constant i is constants[i]; those that the shader lacks are passed
+// over. The caller destroys it.
+Result<VkPipeline> makeComputePipeline(const Device& device, const char* name, VkPipelineLayout layout,
                                        std::span<const std::uint32_t> code, std::span<const std::uint32_t> constants);
 
 }  // namespace billow::runtime

@@ -33,19 +33,21 @@ Result<void> createObjects(Device& device, const LoadedFrame& loaded, FrameObjec
   frame.memory_ = std::move(memory);
   objects.bufferBytes = loaded.buffer.size();
   const std::uint64_t bufferBytes = std::max<std::uint64_t>(loaded.buffer.size(), kSectionAlign);
-  auto buffer = Buffer::make(device, bufferBytes,
+  auto buffer = Buffer::make(device, "billow frame", bufferBytes,
                              VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
                                  VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT);
   if (!buffer) return tl::unexpected(buffer.error());
   objects.memory->buffer = std::move(*buffer);
   frame.stats_.allocatedBytes = objects.memory->buffer.allocationSize();
   frame.shape_ = loaded.shape;
-  auto image = Image::make(device, {.format = loaded.shape.format(), .extent = loaded.shape.extent()});
+  auto image =
+      Image::make(device, "billow frame atlas", {.format = loaded.shape.format(), .extent = loaded.shape.extent()});
   if (!image) return tl::unexpected(image.error());
   objects.memory->atlas = std::move(*image);
   frame.stats_.allocatedBytes += objects.memory->atlas.allocationSize();
   objects.atlasOffset = aligned(bufferBytes);
-  auto staging = Buffer::make(device, objects.atlasOffset + loaded.shape.bytes(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
+  auto staging = Buffer::make(device, "billow staging", objects.atlasOffset + loaded.shape.bytes(),
+                              VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
   if (!staging) return tl::unexpected(staging.error());
   objects.staging = std::move(*staging);
   return {};

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "debug.h"
+
 namespace billow::runtime {
 namespace {
 
@@ -50,7 +52,7 @@ Buffer& Buffer::operator=(Buffer&& other) noexcept {
   return *this;
 }
 
-Result<Buffer> Buffer::make(Device& device, std::uint64_t size, VkBufferUsageFlags usage) {
+Result<Buffer> Buffer::make(Device& device, const char* name, std::uint64_t size, VkBufferUsageFlags usage) {
   Buffer buffer;
   buffer.device_ = &device;
   buffer.size_ = size;
@@ -63,6 +65,7 @@ Result<Buffer> Buffer::make(Device& device, std::uint64_t size, VkBufferUsageFla
   const VkResult result =
       device.api.vkCreateBuffer(device.host.device, &info, device.host.allocationCallbacks, &buffer.buffer_);
   if (result != VK_SUCCESS) return vulkanError("vkCreateBuffer", result);
+  nameObject(device, VK_OBJECT_TYPE_BUFFER, buffer.buffer_, name);
   device.api.vkGetBufferMemoryRequirements(device.host.device, buffer.buffer_, &buffer.requirements_);
   return buffer;
 }
@@ -117,7 +120,7 @@ Image& Image::operator=(Image&& other) noexcept {
   return *this;
 }
 
-Result<Image> Image::make(Device& device, const ImageShape& shape) {
+Result<Image> Image::make(Device& device, const char* name, const ImageShape& shape) {
   Image image;
   image.device_ = &device;
   image.shape_ = shape;
@@ -136,6 +139,7 @@ Result<Image> Image::make(Device& device, const ImageShape& shape) {
   const VkResult result =
       device.api.vkCreateImage(device.host.device, &info, device.host.allocationCallbacks, &image.image_);
   if (result != VK_SUCCESS) return vulkanError("vkCreateImage", result);
+  nameObject(device, VK_OBJECT_TYPE_IMAGE, image.image_, name);
   device.api.vkGetImageMemoryRequirements(device.host.device, image.image_, &image.requirements_);
   return image;
 }

@@ -34,7 +34,8 @@ class Buffer {
   Buffer& operator=(Buffer&& other) noexcept;
   ~Buffer() { reset(); }
 
-  static Result<Buffer> make(Device& device, std::uint64_t size, VkBufferUsageFlags usage);
+  // `name` is what debuggers call it.
+  static Result<Buffer> make(Device& device, const char* name, std::uint64_t size, VkBufferUsageFlags usage);
   Result<void> bind(Placement placement);
   void reset();
 
@@ -68,7 +69,7 @@ class Image {
   ~Image() { reset(); }
 
   // One level, one layer; concurrent where the host's upload and draw families differ.
-  static Result<Image> make(Device& device, const ImageShape& shape);
+  static Result<Image> make(Device& device, const char* name, const ImageShape& shape);
   Result<void> bind();
   void reset();
 

@@ -72,7 +72,8 @@ Passes::~Passes() {
 Result<void> Passes::create() {
   if (auto made = createLayouts(); !made) return made;
   if (auto made = createSets(); !made) return made;
-  auto params = Buffer::make(device_, kParamsStride * inFlight_, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT);
+  auto params =
+      Buffer::make(device_, "billow march parameters", kParamsStride * inFlight_, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT);
   if (!params) return tl::unexpected(params.error());
   params_ = std::move(*params);
   return params_.bind(Placement::mapped);
@@ -128,7 +129,8 @@ Result<VkPipeline> Passes::pipeline(const PassKey& key) {
   VkPipeline& place = pipelines_[key];
   if (place != VK_NULL_HANDLE) return place;
   const std::uint32_t constants[] = {key.index, key.filter, key.shadow, key.grids, key.layers};
-  auto made = makeComputePipeline(device_, pipelineLayout_, spirvOf(key.shader), constants);
+  auto made = makeComputePipeline(device_, key.shader == Shader::voxels ? "billow voxels" : "billow march",
+                                  pipelineLayout_, spirvOf(key.shader), constants);
   if (made) place = *made;
   return made;
 }

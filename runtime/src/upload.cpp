@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "debug.h"
+
 namespace billow::runtime {
 namespace {
 
@@ -42,6 +44,7 @@ Result<void> Uploads::create() {
   info.pNext = &type;
   result = device_.api.vkCreateSemaphore(device_.host.device, &info, device_.host.allocationCallbacks, &semaphore_);
   if (result != VK_SUCCESS) return vulkanError("vkCreateSemaphore", result);
+  nameObject(device_, VK_OBJECT_TYPE_SEMAPHORE, semaphore_, "billow uploads at once");
   return {};
 }
 

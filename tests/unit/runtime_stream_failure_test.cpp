@@ -324,7 +324,12 @@ TEST_F(StreamDevice, ObjectsHaveNamesAndCommandsLabels) {
   ASSERT_TRUE(gpu().render(*renderer, {.frame = frames[0].get(), .width = 4, .height = 4}));
   EXPECT_GT(spy_.labels, before);
   EXPECT_EQ(spy_.open, 0) << "a label was not closed";
-  for (const char* name : {"billow frames", "billow frame atlas", "billow staging ring", "billow uploads"}) {
+  const auto metavoxels = runtime::Metavoxels::create(
+      *renderer, {.edge = 8, .metavoxels = 4, .memoryBudget = 64u << 20, .maxMetavoxels = 64});
+  ASSERT_TRUE(metavoxels) << metavoxels.error().message;
+  for (const char* name :
+       {"billow frames", "billow frame atlas", "billow staging ring", "billow uploads", "billow march",
+        "billow march parameters", "billow metavoxel pool", "billow metavoxel arrays", "billow shadow"}) {
     EXPECT_EQ(spy_.names.count(name), 1u) << name;
   }
 }

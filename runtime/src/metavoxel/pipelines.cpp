@@ -10,20 +10,38 @@
 namespace billow::runtime {
 namespace {
 
-using Code = std::span<const std::uint32_t>;
+struct Program {
+  std::span<const std::uint32_t> code;
+  const char* name;
+};
 
 // In the order of MetavoxelPass.
-Code codeOf(MetavoxelPass pass) {
-  static const Code codes[] = {
-      spirv::kMetavoxelClear,       spirv::kMetavoxelReset,      spirv::kMetavoxelSpawn,
-      spirv::kMetavoxelBin,         spirv::kMetavoxelBin,        spirv::kMetavoxelBinVolume,
-      spirv::kMetavoxelPlan,        spirv::kMetavoxelRank,       spirv::kMetavoxelBlocks,
-      spirv::kMetavoxelFill,        spirv::kMetavoxelFillVolume, spirv::kMetavoxelSum,
-      spirv::kMetavoxelLight,       spirv::kMetavoxelInject,     spirv::kMetavoxelPyramid,
-      spirv::kMetavoxelGather,      spirv::kMetavoxelShadow,     spirv::kMetavoxelKeep,
-      spirv::kMetavoxelSpare,       spirv::kMetavoxelCompare,    spirv::kMetavoxelMarchHalf,
-      spirv::kMetavoxelMarchSingle, spirv::kMetavoxelFinishHalf, spirv::kMetavoxelFinishSingle};
-  return codes[static_cast<std::size_t>(pass)];
+const Program& programOf(MetavoxelPass pass) {
+  static const Program programs[] = {{spirv::kMetavoxelClear, "billow clear"},
+                                     {spirv::kMetavoxelReset, "billow reset"},
+                                     {spirv::kMetavoxelSpawn, "billow spawn"},
+                                     {spirv::kMetavoxelBin, "billow bin, counting"},
+                                     {spirv::kMetavoxelBin, "billow bin"},
+                                     {spirv::kMetavoxelBinVolume, "billow bin volumes"},
+                                     {spirv::kMetavoxelPlan, "billow plan"},
+                                     {spirv::kMetavoxelRank, "billow rank"},
+                                     {spirv::kMetavoxelBlocks, "billow blocks"},
+                                     {spirv::kMetavoxelFill, "billow fill"},
+                                     {spirv::kMetavoxelFillVolume, "billow fill volumes"},
+                                     {spirv::kMetavoxelSum, "billow sum"},
+                                     {spirv::kMetavoxelLight, "billow light"},
+                                     {spirv::kMetavoxelInject, "billow inject"},
+                                     {spirv::kMetavoxelPyramid, "billow pyramid"},
+                                     {spirv::kMetavoxelGather, "billow gather"},
+                                     {spirv::kMetavoxelShadow, "billow shadow"},
+                                     {spirv::kMetavoxelKeep, "billow keep"},
+                                     {spirv::kMetavoxelSpare, "billow spare"},
+                                     {spirv::kMetavoxelCompare, "billow compare"},
+                                     {spirv::kMetavoxelMarchHalf, "billow march (half)"},
+                                     {spirv::kMetavoxelMarchSingle, "billow march (single)"},
+                                     {spirv::kMetavoxelFinishHalf, "billow finish (half)"},
+                                     {spirv::kMetavoxelFinishSingle, "billow finish (single)"}};
+  return programs[static_cast<std::size_t>(pass)];
 }
 
 // Bindings of shaders/metavoxel*.glsl, set 1.
@@ -172,7 +190,7 @@ Result<VkPipeline> MetavoxelPipelines::pipeline(MetavoxelPass pass, PassVariant 
                                      variant.weighted ? 1u : 0u,
                                      variant.sceneShadow ? 1u : 0u,
                                      field_ ? 1u : 0u};
-  auto made = makeComputePipeline(device_, layout_, codeOf(pass), constants);
+  auto made = makeComputePipeline(device_, programOf(pass).name, layout_, programOf(pass).code, constants);
   if (made) place = *made;
   return made;
 }

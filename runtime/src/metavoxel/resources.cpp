@@ -164,46 +164,51 @@ Result<void> MetavoxelResources::makeAll(const MetavoxelConfig& config, std::uin
   const VkBufferUsageFlags transfer = VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
   const VkImageUsageFlags used = VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_SAMPLED_BIT;
   if (auto made =
-          keep(Buffer::make(device_, sizes_.regions.bytes,
+          keep(Buffer::make(device_, "billow metavoxel arrays", sizes_.regions.bytes,
                             transfer | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT |
                                 VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT),
                arrays);
       !made) {
     return made;
   }
-  if (auto made = keep(Buffer::make(device_, uploadStride_ * config.recordsInFlight,
+  if (auto made = keep(Buffer::make(device_, "billow metavoxel uploads", uploadStride_ * config.recordsInFlight,
                                     VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT),
                        uploads);
       !made) {
     return made;
   }
-  if (auto made = keep(Buffer::make(device_, sizeof(gpu::MetavoxelCounters) * config.recordsInFlight,
-                                    VK_BUFFER_USAGE_TRANSFER_DST_BIT),
-                       counters);
-      !made) {
-    return made;
-  }
-  if (auto made = keep(Buffer::make(device_, tableParts(sizes_).bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT), tables_);
-      !made) {
-    return made;
-  }
   if (auto made =
-          keep(Image::make(device_, {.format = VK_FORMAT_R16G16B16A16_SFLOAT,
-                                     .extent = {sizes_.slotsX * edge, sizes_.slotsY * edge, sizes_.slotsZ * edge},
-                                     .usage = used}),
-               pool);
+          keep(Buffer::make(device_, "billow metavoxel counters",
+                            sizeof(gpu::MetavoxelCounters) * config.recordsInFlight, VK_BUFFER_USAGE_TRANSFER_DST_BIT),
+               counters);
       !made) {
     return made;
   }
   if (auto made = keep(
-          Image::make(device_, {.format = VK_FORMAT_R8_UNORM, .extent = {kFace, kFace, sizes_.cubeLayers}}), cubes);
+          Buffer::make(device_, "billow metavoxel tables", tableParts(sizes_).bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT),
+          tables_);
       !made) {
     return made;
   }
-  if (auto made = keep(Image::make(device_, {.format = VK_FORMAT_R32_SFLOAT,
-                                             .extent = {shadowEdge, shadowEdge, 1},
-                                             .type = VK_IMAGE_TYPE_2D,
-                                             .usage = used | VK_IMAGE_USAGE_TRANSFER_SRC_BIT}),
+  if (auto made = keep(Image::make(device_, "billow metavoxel pool",
+                                   {.format = VK_FORMAT_R16G16B16A16_SFLOAT,
+                                    .extent = {sizes_.slotsX * edge, sizes_.slotsY * edge, sizes_.slotsZ * edge},
+                                    .usage = used}),
+                       pool);
+      !made) {
+    return made;
+  }
+  if (auto made = keep(Image::make(device_, "billow displacement maps",
+                                   {.format = VK_FORMAT_R8_UNORM, .extent = {kFace, kFace, sizes_.cubeLayers}}),
+                       cubes);
+      !made) {
+    return made;
+  }
+  if (auto made = keep(Image::make(device_, "billow shadow",
+                                   {.format = VK_FORMAT_R32_SFLOAT,
+                                    .extent = {shadowEdge, shadowEdge, 1},
+                                    .type = VK_IMAGE_TYPE_2D,
+                                    .usage = used | VK_IMAGE_USAGE_TRANSFER_SRC_BIT}),
                        shadow);
       !made) {
     return made;
@@ -214,17 +219,19 @@ Result<void> MetavoxelResources::makeAll(const MetavoxelConfig& config, std::uin
 Result<void> MetavoxelResources::makeField() {
   const FieldSizes& sizes = sizes_.field;
   const VkImageUsageFlags used = VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_SAMPLED_BIT;
-  if (auto made = keep(Image::make(device_, {.format = VK_FORMAT_R16G16B16A16_SFLOAT,
-                                             .extent = {sizes.image[0], sizes.image[1], sizes.image[2]},
-                                             .usage = used | VK_IMAGE_USAGE_TRANSFER_DST_BIT}),
+  if (auto made = keep(Image::make(device_, "billow light pyramid",
+                                   {.format = VK_FORMAT_R16G16B16A16_SFLOAT,
+                                    .extent = {sizes.image[0], sizes.image[1], sizes.image[2]},
+                                    .usage = used | VK_IMAGE_USAGE_TRANSFER_DST_BIT}),
                        pyramid);
       !made) {
     return made;
   }
-  return keep(Image::make(device_, {.format = VK_FORMAT_R16G16B16A16_SFLOAT,
-                                    .extent = {sizes.edge, sizes.edge, sizes.edge},
-                                    .usage = used}),
-              field);
+  return keep(
+      Image::make(
+          device_, "billow light field",
+          {.format = VK_FORMAT_R16G16B16A16_SFLOAT, .extent = {sizes.edge, sizes.edge, sizes.edge}, .usage = used}),
+      field);
 }
 
 Result<void> MetavoxelResources::bindAll() {

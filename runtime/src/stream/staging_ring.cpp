@@ -21,11 +21,10 @@ RingSpace::Piece RingSpace::take(std::uint64_t least, std::uint64_t most, std::u
 Result<StagingRing> StagingRing::make(Device& device, std::uint64_t bytes) {
   const std::uint64_t size = bytes / kAlign * kAlign;
   StagingRing ring;
-  auto buffer = Buffer::make(device, size, VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
+  auto buffer = Buffer::make(device, "billow staging ring", size, VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
   if (!buffer) return tl::unexpected(buffer.error());
   ring.buffer_ = std::move(*buffer);
   if (auto bound = ring.buffer_.bind(Placement::mapped); !bound) return tl::unexpected(bound.error());
-  nameObject(device, VK_OBJECT_TYPE_BUFFER, ring.buffer_.handle(), "billow staging ring");
   ring.space = RingSpace(size);
   return ring;
 }

@@ -47,11 +47,11 @@ Result<void> Uploader::create(std::uint64_t stagingBytes) {
   auto ring = StagingRing::make(device_, stagingBytes);
   if (!ring) return tl::unexpected(ring.error());
   ring_ = std::move(*ring);
-  auto empty = Image::make(device_, {.format = AtlasShape{}.format(), .extent = AtlasShape{}.extent()});
+  auto empty =
+      Image::make(device_, "billow empty atlas", {.format = AtlasShape{}.format(), .extent = AtlasShape{}.extent()});
   if (!empty) return tl::unexpected(empty.error());
   emptyAtlas_ = std::move(*empty);
   if (auto bound = emptyAtlas_.bind(); !bound) return bound;
-  nameObject(device_, VK_OBJECT_TYPE_IMAGE, emptyAtlas_.handle(), "billow empty atlas");
   return createCommands();
 }
 
