@@ -46,9 +46,10 @@ command::Checked<std::unique_ptr<Player>> Player::make(runtime::Renderer& render
 command::Checked<void> Player::open(const command::PlacedVolume& volume) {
   const std::string& path = volume.request->pack;
   if (assets_.contains(path)) return {};
+  FileWatch file(path);  // from before it is read
   const auto asset = streamer_->open({.path = path});
   if (!asset) return tl::unexpected(command::toRefusal(asset.error(), path));
-  assets_.emplace(path, Asset{*asset, FileWatch(path), streamer_->pack(*asset)});
+  assets_.emplace(path, Asset{*asset, std::move(file), streamer_->pack(*asset)});
   return {};
 }
 

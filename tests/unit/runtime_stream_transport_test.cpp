@@ -152,6 +152,10 @@ TEST_F(StreamTransport, BlocksAreNoLargerThanAnAllocationMayBe) {
     frames.push_back(std::move(*arrival.frame));
   }
   EXPECT_GT(before, 3 * most);
+  runtime::deviceOf(*renderer).mostAllocation = 64u << 10;
+  const auto refused = loadOne(*transport, orderOf(pack, 6, 7));
+  ASSERT_FALSE(refused.frame);
+  EXPECT_EQ(refused.frame.error().code, ErrorCode::budget) << "it would wait for ever";
 }
 
 // Everything at random: loads, cancels, evictions, budgets. The budgets hold, what arrives is right, and at the end

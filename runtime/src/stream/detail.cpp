@@ -187,10 +187,9 @@ void Detail::choose(const Snapshot& snapshot, std::vector<PlannedClip>& clips, c
     State& state = stateOf(instance);
     const bool fresh = state.changed < 0;
     const std::uint32_t last = clip.clip->levelCount() - 1;
-    const std::uint8_t before = state.ideal;
-    state.ideal = static_cast<std::uint8_t>(idealLevel(snapshot, instance, *clip.clip, before));
+    const std::uint32_t ideal = idealLevel(snapshot, instance, *clip.clip, state.ideal);
     const auto finest = [&](double limit) {
-      std::uint32_t level = state.ideal;
+      std::uint32_t level = ideal;
       while (level < last && taken + add(clip, ranked, level, 2 * pass + (level == last ? 0 : 1), false) > limit) {
         ++level;
       }
@@ -208,11 +207,12 @@ void Detail::choose(const Snapshot& snapshot, std::vector<PlannedClip>& clips, c
     } else if (snapshot.now - state.changed >= static_cast<double>(state.pause)) {
       const std::uint32_t finer = finest(kFinerOnlyBelow * budget);
       if (finer < level) level = finer;
-      if (state.ideal > level) level = state.ideal;
+      if (ideal > level) level = ideal;
       if (level == state.level && snapshot.now - state.changed > 60) state.pause = kLevelPause;
     }
-    if (fresh || level != state.level || state.ideal != before) {
-      changes.push_back({.kind = Change::Kind::level, .item = level, .ideal = state.ideal, .instance = instance.id});
+    if (fresh || level != state.level || ideal != state.ideal) {
+      changes.push_back({.kind = Change::Kind::level, .item = level, .ideal = ideal, .instance = instance.id});
+      state.ideal = static_cast<std::uint8_t>(ideal);
     }
     if (fresh || level != state.level) {
       state.level = static_cast<std::uint8_t>(level);

@@ -60,6 +60,11 @@ struct Notice {
   std::shared_ptr<const Clip> opened = {};
 };
 
+// Seconds that an update() counts for at least, in what is not play: a game that stands still gets its detail too.
+inline constexpr double kLeastPassing = 1.0 / 240;
+// And at most, in what waits for loads: while a game hangs, nothing it wants is loaded either.
+inline constexpr double kLongestUpdate = 0.1;
+
 // What an update() leaves behind, but for the instances.
 struct Situation {
   double now = 0;  // real seconds, the sum of what update() was told

@@ -3,11 +3,6 @@
 #include <algorithm>
 
 namespace billow::runtime {
-namespace {
-
-constexpr double kLongestUpdate = 0.1;  // seconds; a game that hangs is no slower
-
-}  // namespace
 
 void Planner::pass(Snapshot& snapshot, std::vector<Change>& changes, std::vector<StreamError>& errors) {
   ++passes_;

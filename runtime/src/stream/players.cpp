@@ -303,10 +303,11 @@ bool Players::successorFailed(AssetId asset) const {
   });
 }
 
-void Players::retire(std::unique_ptr<ResidentFrame> frame, Transport& transport) {
-  ++retired_.frames;
-  retired_.bytes += frame->stats().allocatedBytes;
+void Players::retire(std::unique_ptr<ResidentFrame>&& frame, Transport& transport) {
+  const std::uint64_t bytes = frame->stats().allocatedBytes;
   transport.retire(std::move(frame));
+  ++retired_.frames;
+  retired_.bytes += bytes;
 }
 
 // Whether an instance that draws the item would draw nothing without it.
@@ -354,12 +355,12 @@ std::size_t Players::take(std::span<Change> changes, Transport& transport) {
     }
     // What arrives for a closed clip stays: until planning knows that it is closed, it may look at the frame.
     if (track.clip == nullptr && kind != Change::Kind::arrive) continue;
-    ++track.version;
     Track::Slot& slot = track.slots[change.item];
     switch (kind) {
       case Change::Kind::arrive:
         if (slot.frame != nullptr) retire(std::move(slot.frame), transport);
         slot.frame = std::move(change.frame);
+        ++track.version;
         break;
       case Change::Kind::force:
       case Change::Kind::seize:
@@ -369,6 +370,7 @@ std::size_t Players::take(std::span<Change> changes, Transport& transport) {
           break;
         }
         retire(std::move(slot.frame), transport);
+        ++track.version;
         notices_.push_back({.kind = Notice::Kind::retired, .clip = change.clip, .item = change.item, .opened = {}});
         break;
       case Change::Kind::evict:

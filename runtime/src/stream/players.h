@@ -76,9 +76,6 @@ struct InstanceCount {
   std::uint32_t late = 0;  // a frame of the volume has begun, and nothing of the moment is drawn
 };
 
-// Seconds that an update() counts for at least, in what is not play: a game that stands still gets its detail too.
-inline constexpr double kLeastPassing = 1.0 / 240;
-
 class Players {
  public:
   std::uint32_t openClip(std::shared_ptr<const Clip> clip);
@@ -136,7 +133,7 @@ class Players {
   void place(std::uint32_t index);
   void removeAt(std::uint32_t index);
   bool isLast(std::uint32_t clip, std::uint32_t item) const;
-  void retire(std::unique_ptr<ResidentFrame> frame, Transport& transport);
+  void retire(std::unique_ptr<ResidentFrame>&& frame, Transport& transport);
 
   std::vector<Track> tracks_;
   std::vector<std::uint32_t> freeTracks_;  // closed, and planning knows

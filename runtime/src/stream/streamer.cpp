@@ -20,7 +20,6 @@ namespace {
 
 constexpr double kLongestReload = 30;     // seconds until what is drawn must be resident of the new pack
 constexpr double kMostPassing = 60;       // seconds of an update that count for what is not play
-constexpr double kLongestUpdate = 0.1;    // seconds of them: while a game hangs, nothing it wants is loaded either
 constexpr std::size_t kMostErrors = 256;  // that the host has not taken yet; the newest are dropped
 
 struct Asset {
@@ -282,10 +281,14 @@ class StreamerImpl final : public Streamer {
     });
     if (lacking == views.end()) return;
     const std::uint32_t volume = players_.track(lacking->clip).clip->volume;
-    tell({.code = ErrorCode::pack,
+    const auto& volumes = asset.next->pack->pack.volumes();
+    const bool there = volume < volumes.size() && volumes[volume].frameCount != 0;
+    const std::string what = there ? "tables for what is drawn of the new pack do not fit into the CPU budget"
+                                   : "the new pack has no volume " + std::to_string(volume) + " with frames";
+    tell({.code = there ? ErrorCode::budget : ErrorCode::pack,
           .asset = asset.id,
           .volume = volume,
-          .message = "the new pack has no volume " + std::to_string(volume) + " with frames; the old one stays"});
+          .message = what + "; the old one stays"});
     leaveNext(asset);
   }
 

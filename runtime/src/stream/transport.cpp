@@ -236,8 +236,9 @@ void TransportCore::cover(std::uint64_t batch) {
 
 void TransportCore::retire(std::unique_ptr<ResidentFrame>&& frame) {
   const std::lock_guard lock(mutex_);
-  retired_.reserve(retired_.size() + 1);  // where that throws the caller still has the frame
-  retired_.push_back({updates_, std::move(frame)});
+  // Where the place cannot be had the caller still has the frame.
+  retired_.push_back({updates_, nullptr});
+  retired_.back().frame = std::move(frame);
 }
 
 void TransportCore::update() {

@@ -318,7 +318,12 @@ void TransportCore::bury(void* context) {
     const std::lock_guard lock(core.mutex_);
     const auto written = [&](const auto& frame) { return !core.executed(*frame); };
     const auto done = std::stable_partition(core.buried_.begin(), core.buried_.end(), written);
-    frames.reserve(static_cast<std::size_t>(core.buried_.end() - done) + core.loads_.size());
+    try {
+      frames.reserve(static_cast<std::size_t>(core.buried_.end() - done) + core.loads_.size());
+    } catch (const std::bad_alloc&) {
+      core.diesLater_ = true;
+      return;
+    }
     std::move(done, core.buried_.end(), std::back_inserter(frames));
     core.buried_.erase(done, core.buried_.end());
     core.diesLater_ = false;
