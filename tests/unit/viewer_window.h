@@ -128,6 +128,21 @@ class ViewerWindow : public testing::Test {
     ASSERT_EQ(done.code, 0) << done.err;
     shot = readPng(file);
   }
+  // Until it has played through that many frames, and shown as many pictures with more than `least` burning pixels.
+  // check(shot) looks at each.
+  template <class Check>
+  void watchPlay(std::size_t count, std::uint32_t least, const Check& check) const {
+    std::set<int> frames;
+    std::set<std::string> pictures;
+    ASSERT_TRUE(eventually([&] {
+      frames.insert(frame());
+      const Shot shot = picture();
+      check(shot);
+      if (burning(shot) > least) pictures.emplace(shot.rgb.begin(), shot.rgb.end());
+      return frames.size() >= count && pictures.size() >= count;
+    })) << frames.size()
+        << " frames, " << pictures.size() << " pictures";
+  }
   void pause() {
     screen_.hand("key space");
     ASSERT_TRUE(eventually([&] { return paused(); }));
