@@ -102,8 +102,9 @@ struct Device {
   Api api;
   VkPhysicalDeviceMemoryProperties memory{};
   std::uint32_t maxImageExtent3D = 0;
-  std::uint64_t imageGranularity = 1;  // bytes between a buffer and an image in one memory
-  std::uint64_t mostAllocation = 0;    // bytes of one, and of one buffer
+  std::uint64_t imageGranularity = 1;     // bytes between a buffer and an image in one memory
+  std::uint64_t mostAllocation = 0;       // bytes of one, and of one buffer
+  VkExtent3D uploadGranularity{1, 1, 1};  // of image copies on the upload queue
   std::uint64_t budget = 0;
   std::atomic<std::uint64_t> used = 0;
   std::atomic<std::uint64_t> frames = 0;  // that were made: each has a number of its own

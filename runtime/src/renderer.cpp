@@ -2,6 +2,7 @@
 #include <cmath>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "billow/runtime/runtime.h"
 #include "checks.h"
@@ -22,6 +23,21 @@ bool sampled3D(const Device& device, VkFormat format) {
   return device.api.vkGetPhysicalDeviceImageFormatProperties(
              device.host.physicalDevice, format, VK_IMAGE_TYPE_3D, VK_IMAGE_TILING_OPTIMAL,
              VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT, 0, &limits) == VK_SUCCESS;
+}
+
+Result<void> describeFamilies(Device& device) {
+  std::uint32_t count = 0;
+  device.api.vkGetPhysicalDeviceQueueFamilyProperties(device.host.physicalDevice, &count, nullptr);
+  std::vector<VkQueueFamilyProperties> families(count);
+  device.api.vkGetPhysicalDeviceQueueFamilyProperties(device.host.physicalDevice, &count, families.data());
+  for (const auto& [family, what] :
+       {std::pair{device.host.uploadFamily, "uploads"}, std::pair{device.host.drawFamily, "draws"}}) {
+    if (family < count) continue;
+    return failure(ErrorCode::argument,
+                   "HostDevice: there is no queue family " + std::to_string(family) + " for " + what);
+  }
+  device.uploadGranularity = families[device.host.uploadFamily].minImageTransferGranularity;
+  return {};
 }
 
 Result<void> describeDevice(Device& device, BlockUse use) {
@@ -45,7 +61,7 @@ Result<void> describeDevice(Device& device, BlockUse use) {
   const bool software = properties.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
   if (use == BlockUse::decoded || (use == BlockUse::automatic && software)) device.bc7 = false;
   device.leastAtlasBricks = use == BlockUse::native ? 1 : kLeastAtlasBricks;
-  return {};
+  return describeFamilies(device);
 }
 
 // Every feature that is not enabled, with what it is for; "" where none is missing.

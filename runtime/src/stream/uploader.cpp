@@ -4,7 +4,6 @@
 #include <cstring>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "debug.h"
 
@@ -35,15 +34,6 @@ void Uploader::finish() {
 }
 
 Result<void> Uploader::create(std::uint64_t stagingBytes) {
-  std::uint32_t count = 0;
-  device_.api.vkGetPhysicalDeviceQueueFamilyProperties(device_.host.physicalDevice, &count, nullptr);
-  std::vector<VkQueueFamilyProperties> families(count);
-  device_.api.vkGetPhysicalDeviceQueueFamilyProperties(device_.host.physicalDevice, &count, families.data());
-  if (device_.host.uploadFamily >= families.size()) {
-    return failure(ErrorCode::argument, "HostDevice: there is no queue family " +
-                                            std::to_string(device_.host.uploadFamily) + " for uploads");
-  }
-  granularity_ = families[device_.host.uploadFamily].minImageTransferGranularity;
   auto ring = StagingRing::make(device_, stagingBytes);
   if (!ring) return tl::unexpected(ring.error());
   ring_ = std::move(*ring);
@@ -201,15 +191,16 @@ Result<bool> Uploader::copyBuffer(Upload& upload) {
 }
 
 Uploader::AtlasUnit Uploader::unitOf(const AtlasShape& shape) const {
+  const VkExtent3D& granularity = device_.uploadGranularity;
   const VkExtent3D extent = shape.extent();
   const std::uint32_t rows = extent.height / 4;
   const std::uint64_t rowBytes = std::uint64_t{extent.width / 4} * 16;
-  if (granularity_.width == 1 && granularity_.height == 1 && granularity_.depth == 1) {
+  if (granularity.width == 1 && granularity.height == 1 && granularity.depth == 1) {
     return {.bytes = rowBytes, .rows = rows, .slices = 0};
   }
   // Queues that copy coarser parts, or whole images alone, get whole slices; a part that ends with the image may be
   // smaller.
-  const std::uint32_t slices = granularity_.depth == 0 ? extent.depth : std::min(granularity_.depth, extent.depth);
+  const std::uint32_t slices = granularity.depth == 0 ? extent.depth : std::min(granularity.depth, extent.depth);
   return {.bytes = rowBytes * rows * slices, .rows = 0, .slices = slices};
 }
 

@@ -80,7 +80,6 @@ class Uploader {
 
   Device& device_;
   const Job closedCall_;
-  VkExtent3D granularity_{1, 1, 1};  // of image copies on the queue
   StagingRing ring_;
   Image emptyAtlas_;
   VkCommandPool pool_ = VK_NULL_HANDLE;
