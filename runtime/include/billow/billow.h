@@ -567,8 +567,8 @@ typedef struct BillowUpdateInfo {
  * a frame. Never waits, neither for a disk nor for the device; tens of microseconds. */
 BILLOW_API BillowResult billowUpdate(BillowContext* context, const BillowUpdateInfo* info, BillowError* error);
 
-/* What the submission that draws must wait for, on the device, at VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT. What signals it
- * has been submitted, and mostly executed; what was urgent is drawn by the update that submits it. semaphore is
+/* What the submission that draws must wait for, on the device, at VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT. What signals
+ * it has been submitted, and mostly executed; what was urgent is drawn by the update that submits it. semaphore is
  * VK_NULL_HANDLE while detached. */
 typedef struct BillowWait {
   uint32_t size;
