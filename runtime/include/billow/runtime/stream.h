@@ -11,8 +11,8 @@
 //
 // Reading, checking, decompressing and uploading happen on other threads. Nothing here waits for a disk, a lock that is
 // held for long, or the device. What is not resident yet is drawn coarser, and if even that is missing the last moment
-// that was drawn stays. Coarser is a level that the compiler stored (`--levels`); where there is none, means of 8^3 voxels,
-// in which fire all but goes out.
+// that was drawn stays. Coarser is a level that the compiler stored (`--levels`); where there is none, means of 8^3
+// voxels, in which fire all but goes out.
 //
 // Threads: one thread at a time calls a Streamer; callbacks come from any thread. No exception leaves its functions.
 #ifndef BILLOW_RUNTIME_STREAM_H
